@@ -1,0 +1,280 @@
+/** @file
+ * remap.h -- conservative transfer of cell fields between two polyhedral meshes.
+ *
+ *   remap_create      take a communicator, get a context             (collective)
+ *   remap_set_mesh    lend the source mesh, then the target mesh     (not collective)
+ *   remap_build       overlay the two meshes                         (collective)
+ *   remap_field       move cell fields across, either way            (collective)
+ *   remap_destroy     give everything back                           (collective)
+ *
+ * The overlay gives, for every source cell i and target cell j that share volume,
+ *
+ *   V = |i n j|,   M = integral over i n j of (x - c_i),   S = integral of (x - c_i)(x - c_i)^T,
+ *
+ * c_i being the centroid of the source cell. remap_pairs hands them out.
+ *
+ * Conventions that hold for every function below:
+ *   - a collective function is called by every rank of the context's communicator and returns the
+ *     same status on each of them;
+ *   - ranks without cells are welcome: their counts are 0 and their arrays may be NULL;
+ *   - outputs are written only when REMAP_OK is returned;
+ *   - lengths are in the caller's unit, volumes in that unit cubed;
+ *   - indices are 0-based and local to the rank unless named "global";
+ *   - no function prints, exits, or keeps state outside its context;
+ *   - a context is used by one thread at a time; different contexts do not know of each other.
+ */
+#ifndef REMAP_REMAP_H
+#define REMAP_REMAP_H
+
+#include <mpi.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define REMAP_API __attribute__((visibility("default")))
+#else
+#define REMAP_API
+#endif
+
+#define REMAP_VERSION_MAJOR 0
+#define REMAP_VERSION_MINOR 1
+#define REMAP_VERSION_PATCH 0
+
+/** Every status: name, number, text. Numbers are never reused; the greater one wins when ranks differ. */
+#define REMAP_STATUS_LIST(X)                                                                  \
+  X(OK, 0, "success")                                                                         \
+  X(COVERAGE, 1, "target cells are not covered as the caller demands")                        \
+  X(BAD_VALUE, 2, "a field value is not a finite number")                                     \
+  X(BAD_ARGUMENT, 3, "an argument is out of its documented range")                            \
+  X(BAD_ORDER, 4, "a function was called before the one it depends on")                       \
+  X(BAD_MESH, 5, "a mesh breaks a documented invariant")                                      \
+  X(ZONE_OVERLAP, 6, "zones of one mesh overlap")                                             \
+  X(CANCELLED, 7, "the progress callback asked to stop")                                      \
+  X(TOO_LARGE, 8, "a count exceeds what one rank can hold")                                   \
+  X(NO_MEMORY, 9, "memory could not be allocated")                                            \
+  X(MPI_FAILURE, 10, "an MPI call failed")                                                    \
+  X(INCONSISTENT, 11, "the overlay contradicts itself: a check of its own failed")            \
+  X(INTERNAL, 12, "libremap broke one of its own invariants")
+
+typedef enum remap_status {
+#define X(name, number, text) REMAP_##name = number,
+  REMAP_STATUS_LIST(X)
+#undef X
+} remap_status;
+
+/** The two meshes of a context. */
+typedef enum remap_side { REMAP_SOURCE = 0, REMAP_TARGET = 1 } remap_side;
+
+/** Which way fields move. One overlay serves both. */
+typedef enum remap_direction {
+  REMAP_FORWARD  = 0, /**< source to target */
+  REMAP_BACKWARD = 1  /**< target to source */
+} remap_direction;
+
+/** How a polygonal face becomes triangles; the same for both cells beside it, in every zone and on every rank. */
+typedef enum remap_faces {
+  REMAP_FACES_CENTRE   = 0, /**< fan about the mean of the vertices; planar and concave faces as DIAGONAL */
+  REMAP_FACES_DIAGONAL = 1  /**< as few triangles as possible, shorter diagonals first */
+} remap_faces;
+
+/** What a field is, hence what its transfer conserves. */
+typedef enum remap_nature {
+  REMAP_CONSERVED     = 0, /**< amount per volume: the integral of the field is kept */
+  REMAP_MASS_SPECIFIC = 1, /**< amount per mass: treated as VOLUME_MEAN, noted in the report */
+  REMAP_VOLUME_MEAN   = 2, /**< averaged over volume */
+  REMAP_FLAG          = 3  /**< a code, never averaged: taken from the cell of largest overlap */
+} remap_nature;
+
+/** Bounds on the reconstruction inside each giving cell. */
+typedef enum remap_limiter {
+  REMAP_LIMITER_NONE            = 0, /**< linear fields are reproduced exactly; may overshoot at jumps */
+  REMAP_LIMITER_BARTH_JESPERSEN = 1, /**< no value beyond those of the vertex neighbours */
+  REMAP_LIMITER_AUTO            = 2  /**< the library's choice: BARTH_JESPERSEN */
+} remap_limiter;
+
+/** What a receiving cell without any overlap gets. */
+typedef enum remap_on_uncovered {
+  REMAP_UNCOVERED_KEEP    = 0, /**< its old value, else the nearest mapped cell's */
+  REMAP_UNCOVERED_NEAREST = 1, /**< the value of the nearest mapped cell, by layers of neighbours */
+  REMAP_UNCOVERED_FILL    = 2, /**< fill_value */
+  REMAP_UNCOVERED_ERROR   = 3  /**< remap_field returns REMAP_COVERAGE */
+} remap_on_uncovered;
+
+/** What a receiving cell that is covered in part gets. */
+typedef enum remap_on_partial {
+  REMAP_PARTIAL_BLEND     = 0, /**< old content on the uncovered part; NORMALISE where there is no old value */
+  REMAP_PARTIAL_NORMALISE = 1, /**< the mean over the covered part, taken to the cell's centroid */
+  REMAP_PARTIAL_CONSERVE  = 2, /**< the content received over the whole volume */
+  REMAP_PARTIAL_ERROR     = 3  /**< remap_field returns REMAP_COVERAGE */
+} remap_on_partial;
+
+/** How much of a cell the other mesh covers. Decided exactly, not by a threshold. */
+typedef enum remap_cover {
+  REMAP_UNCOVERED = 0, /**< no pair */
+  REMAP_PARTIAL   = 1, /**< pairs, and a part outside of the other mesh */
+  REMAP_COVERED   = 2  /**< wholly inside the other mesh */
+} remap_cover;
+
+/** A context: one pair of meshes on one communicator. Opaque. */
+typedef struct remap_context remap_context;
+
+/** Options of a context. Start from remap_options_default(). */
+typedef struct remap_options {
+  remap_faces faces;     /**< triangulation of faces, both meshes; default REMAP_FACES_CENTRE */
+  int         max_order; /**< highest order that remap_field will be asked for: 1, 2; default 2 */
+  int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP where zones of one mesh overlap by more
+                                          than rounding inside the other mesh; 0 (default): counted in remap_stats */
+
+  /** Called with one line of text for a human, without a newline; any rank may call. NULL: silence. */
+  void (*log)(void *user, const char *line);
+  /** Called now and then on every rank during remap_build, with the phase's name and the share of it that is done on
+   *  this rank (0..1). Returning anything but 0 cancels: every rank then returns REMAP_CANCELLED. NULL: none. */
+  int (*progress)(void *user, const char *phase, double done);
+  void *user; /**< handed to log and progress */
+} remap_options;
+
+/** One rank's part of a mesh; the parts of all ranks are disjoint sets of cells. Borrowed: it and everything it points to
+ *  are read during remap_build only and never freed.
+ *
+ *  A face is a loop of nodes, its normal (by the right-hand rule) pointing out of face_owner. A face between cells of two
+ *  ranks, or of two zones, is given once by each, with neighbour -1: faces join by the coordinates of their nodes. Nodes
+ *  are shared or repeated as the caller likes. Coordinates are finite; a face has at least 3 nodes; every cell is closed. */
+typedef struct remap_mesh {
+  int64_t        num_nodes, num_faces, num_cells;
+  const double  *node_xyz;       /**< [num_nodes][3]                                       */
+  const int64_t *face_offset;    /**< [num_faces + 1], face_offset[0] == 0                 */
+  const int64_t *face_node;      /**< [face_offset[num_faces]], 0 <= node < num_nodes      */
+  const int64_t *face_owner;     /**< [num_faces], 0 <= cell < num_cells                   */
+  const int64_t *face_neighbour; /**< [num_faces], -1 where there is none                  */
+  const int64_t *cell_global;    /**< [num_cells] distinct over all ranks, >= 0; NULL: numbered rank after rank;
+                                      NULL on all ranks or on none, but ranks without cells are free         */
+
+  const char        *name;             /**< used in messages, say the file's name; may be NULL           */
+  int64_t            num_zones;        /**< 0 if the mesh has no zones                                   */
+  const char *const *zone_name;        /**< [num_zones] used in messages                                 */
+  const int64_t     *zone_cell_offset; /**< [num_zones + 1] zone z holds the global cells from zone_cell_offset[z] up to
+                                            zone_cell_offset[z + 1]; the same on every rank              */
+} remap_mesh;
+
+/** How remap_field transfers. Start from remap_transfer_default(). */
+typedef struct remap_transfer {
+  int                order;        /**< 1 or 2, not above options.max_order; default 2 */
+  remap_limiter      limiter;      /**< default REMAP_LIMITER_AUTO */
+  remap_on_uncovered on_uncovered; /**< default REMAP_UNCOVERED_KEEP */
+  remap_on_partial   on_partial;   /**< default REMAP_PARTIAL_BLEND */
+  double             fill_value;   /**< for REMAP_UNCOVERED_FILL; default NaN */
+} remap_transfer;
+
+/** One field of a call of remap_field. */
+typedef struct remap_field_desc {
+  const char   *name;    /**< used in messages; may be NULL */
+  remap_nature  nature;
+  int           has_old; /**< not 0: out holds old values at entry, in every cell; the same on every rank */
+  const double *in;      /**< [cells of the giving mesh on this rank] borrowed */
+  double       *out;     /**< [cells of the receiving mesh on this rank] borrowed, written */
+} remap_field_desc;
+
+/** What a field's transfer did, over all ranks. */
+typedef struct remap_field_report {
+  int     order;              /**< order used */
+  double  source_integral;    /**< u V over covered giving cells, u over the pairs' volumes for partial ones */
+  double  target_integral;    /**< new content less the old content that was kept */
+  double  conservation_error; /**< their difference over the sum of abs(u) V */
+  double  source_min, source_max, target_min, target_max;
+  int64_t limited_cells;      /**< giving cells whose slope was reduced */
+} remap_field_report;
+
+/** What remap_build found, over all ranks; the same on every rank. Volumes in the caller's unit cubed. */
+typedef struct remap_stats {
+  int     ranks;
+  int64_t cells[2];               /**< [side] */
+  double  volume[2];              /**< [side] sum of abs(cell volume) */
+  int64_t inverted_cells[2];      /**< [side] cells of negative volume */
+  int64_t pairs;                  /**< (source cell, target cell) that share volume */
+  double  overlap_volume;         /**< sum of V over the pairs */
+  int64_t cells_by_cover[2][3];   /**< [side][remap_cover] */
+  double  max_closure_error[2];   /**< [side] largest abs(sum of V over the cell's pairs / cell volume - 1), covered cells */
+  int64_t worst_closure_cell[2];  /**< [side] its global id, -1 if none is covered */
+  double  zone_overlap_volume[2]; /**< [side] volume in which cells of the mesh itself overlap, as far as the other mesh
+                                       sees it; rounding at patched zones shows here */
+  int64_t crossings;              /**< edges of one mesh through triangles of the other */
+  double  seconds_partition, seconds_overlay, seconds_transfer; /**< wall clock, slowest rank; transfer: all calls so far */
+} remap_stats;
+
+/** Pairs of one direction as rows of a sparse matrix, one row per receiving cell of this rank. A view: owned by the
+ *  context, valid until the next remap_build or remap_destroy. Within a row the order is canonical: it depends on
+ *  coordinates only. */
+typedef struct remap_pairs_view {
+  int64_t        num_rows;   /**< receiving cells on this rank */
+  const int64_t *row_offset; /**< [num_rows + 1] */
+  const int64_t *global_cell; /**< [row_offset[num_rows]] the giving cell */
+  const int     *owner_rank; /**< [same] the rank that handed it in */
+  const double  *volume;     /**< [same] V */
+  const double  *moment;     /**< [same][3] integral of (x - c), c the centroid of the giving cell */
+  const uint8_t *same;       /**< [same] 1: the two cells cover each other alone */
+} remap_pairs_view;
+
+/** A short text for a status; static text, never NULL. Not collective. */
+REMAP_API const char *remap_status_text(remap_status status);
+
+/** "0.1.0"; static text. Not collective. */
+REMAP_API const char *remap_version(void);
+
+/** Set every option to its default. Not collective. */
+REMAP_API void remap_options_default(remap_options *options);
+
+/** Set every member to its default. Not collective. */
+REMAP_API void remap_transfer_default(remap_transfer *transfer);
+
+/** Make a context on a duplicate of comm. Collective on comm. options are copied and must agree on all ranks; NULL means
+ *  the defaults. The caller owns *out and ends it with remap_destroy.
+ *  Errors: BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE; *out is then NULL. */
+REMAP_API remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_context **out);
+
+/** Lend this rank's part of one mesh. Not collective: nothing is read before remap_build, which reports what is wrong. The
+ *  struct is copied, what it points to is borrowed until remap_build returns. Setting a mesh again replaces it and makes
+ *  the last overlay unusable. Errors: BAD_ARGUMENT. */
+REMAP_API remap_status remap_set_mesh(remap_context *ctx, remap_side side, const remap_mesh *mesh);
+
+/** Overlay the two meshes. Collective. Errors: BAD_ORDER (a mesh is missing on this or another rank), BAD_MESH,
+ *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
+REMAP_API remap_status remap_build(remap_context *ctx);
+
+/** Transfer num_fields cell fields. Collective. All of transfer, num_fields, names and natures agree on all ranks.
+ *  reports, if not NULL, is [num_fields] and gets the same content on every rank.
+ *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value), COVERAGE, NO_MEMORY, MPI_FAILURE. */
+REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                                   const remap_field_desc *fields, remap_field_report *reports);
+
+/** The greatest of the ranks' statuses, for callers who want their own failures to be shared. Collective. */
+REMAP_API remap_status remap_agree(remap_context *ctx, remap_status mine);
+
+/** The text that belongs to the last failure: names the mesh, zone and cell, and what to do. The same on every rank; empty
+ *  if nothing failed. Owned by the context, valid until its next call. Not collective. */
+REMAP_API const char *remap_message(const remap_context *ctx);
+
+/** Statistics of the last remap_build. Not collective. Errors: BAD_ORDER. */
+REMAP_API remap_status remap_get_stats(const remap_context *ctx, remap_stats *out);
+
+/** The pairs, as rows of the receiving mesh. Not collective. *out is a view owned by the context. Errors: BAD_ORDER. */
+REMAP_API remap_status remap_pairs(const remap_context *ctx, remap_direction direction, remap_pairs_view *out);
+
+/** How much of each cell of one side is covered by the other mesh. Not collective. fraction and cover, [cells of that side
+ *  on this rank], are the caller's; either may be NULL. Errors: BAD_ORDER. */
+REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover);
+
+/** Volumes (signed: negative for an inverted cell) and centroids of the cells of one side. Not collective. volume [cells]
+ *  and centroid [cells][3] are the caller's; either may be NULL. Errors: BAD_ORDER. */
+REMAP_API remap_status remap_cells(const remap_context *ctx, remap_side side, double *volume, double *centroid);
+
+/** End a context and set *ctx to NULL. Collective, and harmless on a NULL context. */
+REMAP_API void remap_destroy(remap_context **ctx);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,45 @@
+/* mapping -- pairs with their moments in; ancestor tables out, both ways: rows of the target cells at their owners, rows of the
+ * source cells at theirs, in canonical order, with coverage and closure. */
+#ifndef RM_MAPPING_H
+#define RM_MAPPING_H
+
+#include "moments/moments.h"
+
+/* The pairs of the cells of one side (the receiving cells), on the rank that handed them in. Read-only once built. Invariants:
+ *   a row's pairs ascend by the giving cell's (Morton key of the centroid, centroid, volume, global id);
+ *   giver[] points into the halo lists; each (rank, cell) is listed once there, ascending;
+ *   same[k] only if the pair is alone in its row and in its partner's row and both cells are covered: then volume[k] is this
+ *   cell's own volume and moment[k] is 0. */
+typedef struct rm_rows {
+  rm_lid         num_cells;    /* receiving cells                                                          */
+  const int64_t *offset;       /* [num_cells + 1]                                                          */
+  const rm_lid  *giver;        /* [offset[num_cells]] place in the halo of giving cells                    */
+  const double  *volume;       /* [same] V, own frame                                                      */
+  const double (*moment)[3];   /* [same] integral of (x - c), c the GIVING cell's centroid                 */
+  const uint8_t *same;         /* [same]                                                                   */
+  const uint8_t *cover;        /* [num_cells] remap_cover                                                  */
+  rm_lid         num_givers;   /* giving cells that this rank needs, from all ranks                        */
+  const int     *giver_rank;   /* [num_givers] ascending                                                   */
+  const rm_lid  *giver_cell;   /* [num_givers] number on that rank, ascending within a rank                */
+  const rm_gid  *giver_global; /* [num_givers]                                                             */
+  const double (*giver_centroid)[3]; /* [num_givers]                                                       */
+  const rm_plan *plan;         /* brings the givers' values here                                           */
+} rm_rows;
+
+typedef struct rm_mapping {
+  rm_rows rows[2]; /* [side that receives]: rows[REMAP_TARGET] serves forward, rows[REMAP_SOURCE] backward */
+  rm_gid  num_pairs;                 /* over all ranks                                    */
+  double  overlap_volume;            /* over all ranks, exact sum rounded once, own frame */
+  rm_gid  cells_by_cover[2][3];      /* over all ranks [side][remap_cover]                */
+  double  max_closure_error[2];      /* over all ranks, covered cells                     */
+  rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
+} rm_mapping;
+
+/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN, else
+ * covered; a source cell likewise by TARGET_SKIN. */
+remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                              const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
+/* Every invariant that one rank can see; slow. Not collective. */
+remap_status rm_mapping_check(const rm_mapping *mapping, const rm_mesh *const mesh[2]);
+
+#endif

@@ -1,0 +1,38 @@
+/* part -- the zone in; out the cells of both meshes that this rank overlays. Target cells are cut into contiguous intervals of the
+ * Morton keys of their boxes' centres by a parallel sample sort with weights that estimate their pairs: each goes to exactly one
+ * rank. A source cell goes to every rank that has a target cell whose box it meets. */
+#ifndef RM_PART_H
+#define RM_PART_H
+
+#include "zone/zone.h"
+
+/* The cells of one mesh on the rank that overlays them. Read-only once built. Invariants:
+ *   every cell's faces are all here; a face between two cells of this piece that came from one rank is listed once;
+ *   nodes of different senders may repeat coordinates. */
+typedef struct rm_piece {
+  rm_lid          num_nodes, num_faces, num_cells;
+  const double  (*node_xyz)[3];      /* [num_nodes]                                                         */
+  const int64_t  *face_offset;       /* [num_faces + 1]                                                     */
+  const rm_lid   *face_node;         /* [face_offset[num_faces]]                                            */
+  const rm_lid  (*face_cell)[2];     /* [num_faces] owner, neighbour or -1; a kept face's missing owner: the
+                                        loop is turned so that face_cell[f][0] >= 0 always                 */
+  const uint8_t  *face_is_skin;      /* [num_faces] of the whole mesh, as in rm_mesh                        */
+  const rm_gid   *cell_global;       /* [num_cells]                                                         */
+  const int      *cell_home_rank;    /* [num_cells] whose part of the mesh it belongs to                    */
+  const rm_lid   *cell_home;         /* [num_cells] its number there                                        */
+  const double   *cell_volume;       /* [num_cells] as in rm_mesh                                           */
+  const double  (*cell_centroid)[3]; /* [num_cells]                                                         */
+} rm_piece;
+
+typedef struct rm_part {
+  rm_piece piece[2]; /* [side] */
+} rm_part;
+
+/* Collective. Lives in arena. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let
+ * results depend on it. TOO_LARGE if a piece has 2^31 or more entities. */
+remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                           const rm_zone *zone, const rm_part **out, rm_reason *reason);
+/* Every invariant above; slow. Not collective. */
+remap_status rm_part_check(const rm_part *part);
+
+#endif

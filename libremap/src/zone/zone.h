@@ -1,0 +1,38 @@
+/* zone -- two meshes in; out which of their cells can meet the other mesh at all (the overlap zone). What can never meet is left
+ * behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh; nothing of global
+ * size. O(n log B) time. */
+#ifndef RM_ZONE_H
+#define RM_ZONE_H
+
+#include "mesh/mesh.h"
+
+enum { RM_ZONE_BOXES = 64 };
+
+/* A flat binary tree of boxes over items, for queries by box. Read-only once built; not collective. Touching boxes meet. */
+typedef struct rm_boxtree {
+  rm_lid         num_items;
+  int64_t        num_nodes;
+  const double (*box)[6];    /* [num_nodes] min x, y, z, max x, y, z                                   */
+  const rm_lid  *first;      /* [num_nodes] leaf: first place in item; inner: node of the second child */
+  const rm_lid  *count;      /* [num_nodes] leaf: number of items; inner: 0 (first child is node + 1)  */
+  const rm_lid  *item;       /* [num_items] in the tree's order                                        */
+} rm_boxtree;
+/* Build over n boxes by median splits on centres; leaves hold at most 8 items. Lives in arena. O(n log n). */
+remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6], const rm_boxtree **out);
+/* Call visit(user, item) for every item of a leaf whose own box meets `box`, until it returns non-zero, which is handed back.
+ * Items' boxes must be given again. O(log n + hits). */
+int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
+                     int (*visit)(void *user, rm_lid item), void *user);
+
+/* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */
+typedef struct rm_zone {
+  rm_lid         num_cells[2]; /* [side]                                                            */
+  const rm_lid  *cell[2];      /* [side][num_cells[side]] cells whose box meets a box of the other mesh */
+} rm_zone;
+
+/* Collective. Lives in arena. */
+remap_status rm_zone_build(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone **out);
+/* Every invariant that one rank can see; slow. Not collective. */
+remap_status rm_zone_check(const rm_zone *zone, const rm_mesh *const mesh[2]);
+
+#endif
