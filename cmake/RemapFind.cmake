@@ -1,0 +1,18 @@
+# remap_find(<target> HEADER <header> LIBRARY <names...> PACKAGE <Debian package> [SUFFIXES <include folders...>])
+# makes an imported target for a C library without CMake support of its own, or stops and names the package to install.
+function(remap_find target)
+  cmake_parse_arguments(PARSE_ARGV 1 F "" "HEADER;PACKAGE" "LIBRARY;SUFFIXES")
+  if(TARGET ${target})
+    return()
+  endif()
+  string(MAKE_C_IDENTIFIER ${target} name)
+  find_path(${name}_INCLUDE ${F_HEADER} PATH_SUFFIXES ${F_SUFFIXES})
+  find_library(${name}_LIBRARY NAMES ${F_LIBRARY})
+  mark_as_advanced(${name}_INCLUDE ${name}_LIBRARY)
+  if(NOT ${name}_INCLUDE OR NOT ${name}_LIBRARY)
+    message(FATAL_ERROR "${F_HEADER} or its library is missing: apt install ${F_PACKAGE}")
+  endif()
+  add_library(${target} UNKNOWN IMPORTED GLOBAL)
+  set_target_properties(${target} PROPERTIES
+    IMPORTED_LOCATION ${${name}_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${${name}_INCLUDE})
+endfunction()
