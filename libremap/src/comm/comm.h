@@ -16,7 +16,7 @@ void rm_comm_free(rm_comm *comm);
 
 /* One status for all: the greatest number wins; *first_rank (may be NULL) is the lowest rank that has it. */
 remap_status rm_comm_agree(const rm_comm *comm, remap_status mine, int *first_rank);
-/* The same, and *reason becomes that rank's everywhere (unchanged if all is well). */
+/* The same, and *reason (may be NULL) becomes that rank's everywhere: unchanged if all is well, empty if MPI failed. */
 remap_status rm_comm_agree_reason(const rm_comm *comm, remap_status mine, rm_reason *reason);
 
 /* In place over all ranks, elementwise. */
@@ -45,6 +45,7 @@ typedef struct rm_plan {
   const int     *send_rank, *recv_rank;      /* [num_send], [num_recv] ascending                         */
   const int64_t *send_offset, *recv_offset;  /* [num_send + 1], [num_recv + 1]                            */
   const rm_lid  *send_item;                  /* [send_offset[num_send]] which of my items to send         */
+  MPI_Request   *request;                    /* [num_send + num_recv] scratch of rm_plan_run              */
 } rm_plan;
 /* This rank wants item want_item[k] of rank want_rank[k], k < num_want, want_rank ascending. Received items come in that order.
  * The plan lives in arena. */
