@@ -13,7 +13,10 @@ static void first_reason_stays(void)
   RT_EQ(reason.global_cell, 7);
 }
 
-static void a_reason_may_be_absent(void) { RT_EQ(rm_fail(REMAP_NO_MEMORY, NULL, -1, -1, "nobody reads this"), REMAP_NO_MEMORY); }
+static void a_reason_may_be_absent(void)
+{
+  RT_EQ(rm_fail(REMAP_NO_MEMORY, NULL, -1, -1, "nobody reads this"), REMAP_NO_MEMORY);
+}
 
 static void long_text_is_cut(void)
 {

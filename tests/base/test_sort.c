@@ -87,7 +87,7 @@ static void minus_zero_comes_before_plus_zero(void)
 /* A list on which the median of three is always the worst choice (Musser's killer), so that the fallback has to take over. */
 static void quicksort_killer_is_sorted_in_time(void)
 {
-  const int64_t n     = 400000, half = n / 2;
+  const int64_t n = 400000, half = n / 2;
   double       *data  = malloc((size_t)n * sizeof *data);
   int64_t       wrong = 0;
   double        begin;
@@ -199,6 +199,6 @@ static void points_of_a_grid_do_not_collide(void)
 
 RT_MAIN(RT_CASE(keys_are_sorted_and_equal_keys_keep_their_order), RT_CASE(doubles_are_sorted),
         RT_CASE(minus_zero_comes_before_plus_zero), RT_CASE(quicksort_killer_is_sorted_in_time),
-        RT_CASE(sum_of_a_list_does_not_depend_on_its_order), RT_CASE(sum_of_a_list_is_compensated), RT_CASE(counts_become_offsets),
-        RT_CASE(zeros_of_both_signs_hash_alike), RT_CASE(every_bit_of_a_word_reaches_every_bit_of_its_hash),
-        RT_CASE(points_of_a_grid_do_not_collide))
+        RT_CASE(sum_of_a_list_does_not_depend_on_its_order), RT_CASE(sum_of_a_list_is_compensated),
+        RT_CASE(counts_become_offsets), RT_CASE(zeros_of_both_signs_hash_alike),
+        RT_CASE(every_bit_of_a_word_reaches_every_bit_of_its_hash), RT_CASE(points_of_a_grid_do_not_collide))

@@ -119,9 +119,9 @@ static void ties_go_to_even(void)
 
 static void integers_sum_without_error(void)
 {
-  rm_sum   sum;
-  __extension__ __int128 want = 0;
-  uint64_t state = 5;
+  rm_sum                 sum;
+  __extension__ __int128 want  = 0;
+  uint64_t               state = 5;
 
   rm_sum_clear(&sum);
   for (int i = 0; i < 2000000; i++) {
