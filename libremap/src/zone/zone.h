@@ -8,6 +8,12 @@
 
 enum { RM_ZONE_BOXES = 64 };
 
+/* True if two boxes have a point in common; touching is enough. */
+static inline bool rm_box_meets(const double a[6], const double b[6])
+{
+  return a[0] <= b[3] && b[0] <= a[3] && a[1] <= b[4] && b[1] <= a[4] && a[2] <= b[5] && b[2] <= a[5];
+}
+
 /* A flat binary tree of boxes over items, for queries by box. Read-only once built; not collective. Touching boxes meet. */
 typedef struct rm_boxtree {
   rm_lid         num_items;
@@ -23,6 +29,10 @@ remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6],
  * Items' boxes must be given again. O(log n + hits). */
 int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
                      int (*visit)(void *user, rm_lid item), void *user);
+
+/* The boxes of at most RM_ZONE_BOXES groups of neighbouring items that together hold all n boxes: group is [RM_ZONE_BOXES][6],
+ * *num_groups is 0 only if n is. Not collective. Working memory from scratch. O(n log RM_ZONE_BOXES). */
+remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], double (*group)[6], int *num_groups);
 
 /* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */
 typedef struct rm_zone {
