@@ -11,7 +11,9 @@ if(REMAP_LONG_TESTS)
 endif()
 if(REMAP_SANITIZE)
   list(APPEND REMAP_TEST_ENV
-    LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/lsan.supp:print_suppressions=0 UBSAN_OPTIONS=print_stacktrace=1)
+    LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/lsan.supp:print_suppressions=0
+    ASAN_OPTIONS=leak_check_at_exit=0 # rt.h asks for leaks before MPI_Finalize
+    UBSAN_OPTIONS=print_stacktrace=1)
 endif()
 
 # remap_test_properties(<name> <room> <ranks> [TIMEOUT <seconds>]): what every test has in common.
