@@ -1,0 +1,133 @@
+/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. Working memory of
+ * a stage is dropped before the next one ships, so the peak is the product and what one mesh sends and receives. */
+#include "part/part_private.h"
+
+/* Where the cells of both meshes go. Collective. */
+static remap_status plan_routes(rm_arena *scratch, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                                const rm_zone *zone, rm_route route[2], rm_reason *reason)
+{
+  rm_frame zone_frame;
+
+  RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
+  RM_TRY(rm_part_cut(scratch, comm, &zone_frame, mesh, zone, &route[REMAP_TARGET]));
+  return rm_part_match(scratch, comm, mesh, zone, &route[REMAP_TARGET], &route[REMAP_SOURCE], reason);
+}
+
+/* Ship one mesh with working memory of its own. Collective. */
+static remap_status ship(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route, rm_piece *piece,
+                         rm_reason *reason)
+{
+  rm_arena    *scratch = rm_arena_new();
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh, route, piece, reason));
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                           const rm_zone *zone, const rm_part **out, rm_reason *reason)
+{
+  rm_arena    *scratch = rm_arena_new();
+  rm_part     *part    = rm_arena_alloc(arena, 1, sizeof *part);
+  rm_route     route[2];
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch && part ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(scratch && part);
+  RM_GOTO(done, status = plan_routes(scratch, comm, frame, mesh, zone, route, reason));
+  for (int side = 0; side < 2; side++)
+    RM_GOTO(done, status = ship(arena, comm, mesh[side], &route[side], &part->piece[side], reason));
+  RM_ASSERT(rm_part_check(part) != REMAP_INTERNAL);
+  *out = part;
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+static bool numbers_are_right(const rm_piece *p)
+{
+  if (p->num_nodes < 0 || p->num_faces < 0 || p->num_cells < 0 || p->face_offset[0] != 0) return false;
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    const rm_lid *cell = p->face_cell[f];
+
+    if (p->face_offset[f + 1] - p->face_offset[f] < 3) return false;
+    if (cell[0] < 0 || cell[0] >= p->num_cells || cell[1] < -1 || cell[1] >= p->num_cells) return false;
+    if (p->face_is_skin[f] > (cell[1] < 0)) return false;
+    for (int64_t i = p->face_offset[f]; i < p->face_offset[f + 1]; i++)
+      if (p->face_node[i] < 0 || p->face_node[i] >= p->num_nodes) return false;
+  }
+  for (rm_lid c = 1; c < p->num_cells; c++) {
+    const bool same_sender = p->cell_home_rank[c] == p->cell_home_rank[c - 1];
+
+    if (p->cell_home_rank[c] < p->cell_home_rank[c - 1]) return false;
+    if (same_sender && p->cell_home[c] <= p->cell_home[c - 1]) return false;
+  }
+  return true;
+}
+
+/* A face between two cells from one sender is listed once, so it joins cells of one sender; and every node is used. */
+static bool senders_are_apart(const rm_piece *p, uint8_t *node_is_used)
+{
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    const rm_lid *cell = p->face_cell[f];
+
+    if (cell[1] >= 0 && p->cell_home_rank[cell[0]] != p->cell_home_rank[cell[1]]) return false;
+  }
+  for (int64_t i = 0; i < p->face_offset[p->num_faces]; i++) node_is_used[p->face_node[i]] = 1;
+  for (rm_lid v = 0; v < p->num_nodes; v++)
+    if (!node_is_used[v]) return false;
+  return true;
+}
+
+/* Every cell has faces, and they close it: each edge is used as often one way as the other. Edges are hashed and the hashes added
+ * with the sign of their direction; a missing or turned face leaves a sum that is not zero but with a chance of 2^-64. */
+static bool cells_are_closed(const rm_piece *p, uint64_t *sum, uint8_t *has_face)
+{
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    const int64_t first = p->face_offset[f], end = p->face_offset[f + 1];
+    uint64_t      loop = 0;
+
+    for (int64_t i = first; i < end; i++) {
+      const rm_lid   a = p->face_node[i], b = p->face_node[i + 1 < end ? i + 1 : first];
+      const rm_lid   low = a < b ? a : b, high = a < b ? b : a;
+      const uint64_t hash = rm_hash_word((uint64_t)low << 32 | (uint64_t)high);
+
+      if (a != b) loop += a < b ? hash : 0 - hash;
+    }
+    for (int k = 0; k < 2; k++)
+      if (p->face_cell[f][k] >= 0) {
+        sum[p->face_cell[f][k]] += k == 0 ? loop : 0 - loop;
+        has_face[p->face_cell[f][k]] = 1;
+      }
+  }
+  for (rm_lid c = 0; c < p->num_cells; c++)
+    if (sum[c] != 0 || !has_face[c]) return false;
+  return true;
+}
+
+static remap_status check_piece(rm_arena *scratch, const rm_piece *p)
+{
+  uint8_t  *node_is_used, *has_face;
+  uint64_t *sum;
+
+  RM_REQUIRE(numbers_are_right(p), REMAP_INTERNAL);
+  RM_NEW0(node_is_used, scratch, p->num_nodes);
+  RM_NEW0(has_face, scratch, p->num_cells);
+  RM_NEW0(sum, scratch, p->num_cells);
+  RM_REQUIRE(senders_are_apart(p, node_is_used), REMAP_INTERNAL);
+  RM_REQUIRE(cells_are_closed(p, sum, has_face), REMAP_INTERNAL);
+  return REMAP_OK;
+}
+
+remap_status rm_part_check(const rm_part *part)
+{
+  rm_arena    *scratch = rm_arena_new();
+  remap_status status  = scratch ? REMAP_OK : REMAP_NO_MEMORY;
+
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) status = check_piece(scratch, &part->piece[side]);
+  rm_arena_drop(scratch);
+  return status;
+}

@@ -1,0 +1,296 @@
+/* ship -- cells travel with their faces and nodes. For every destination the sender numbers what goes there anew; the receiver sets
+ * the senders' parcels one after the other and shifts the numbers. Nodes and faces go once to each destination. O(n) time;
+ * besides the product, memory for what is sent and for the cells and faces that arrive. */
+#include "part/part_private.h"
+
+#include <string.h>
+
+/* A face and a cell under way; cells are numbered within the parcel. */
+typedef struct wire_face {
+  rm_lid  num_nodes;
+  rm_lid  cell[2]; /* the loop's normal points out of cell[0] >= 0; cell[1] may be -1 */
+  int32_t is_skin;
+} wire_face;
+
+typedef struct wire_cell {
+  rm_gid  global;
+  int64_t home;
+  double  volume, centroid[3];
+} wire_cell;
+
+/* A parcel for, or from, every rank, one after the other. The cells' offsets stand beside it. */
+typedef struct parcels {
+  int64_t   *node_offset, *face_offset, *corner_offset; /* [comm->size + 1]                             */
+  double   (*node)[3];                                  /* [node_offset[comm->size]]                    */
+  wire_face *face;                                      /* [face_offset[comm->size]]                    */
+  rm_lid    *corner;                                    /* [corner_offset[comm->size]] node in the parcel */
+  wire_cell *cell;
+} parcels;
+
+/* What the sender packs from. place_of_* tells where an entity of the mesh stands among all parcels, -1 if it is in none yet.
+ * Parcels are filled in turn, so an entity is in the present one if it does not stand before that one's first. */
+typedef struct packing {
+  const rm_mesh  *mesh;
+  const rm_route *route;
+  int             num_ranks;
+  int64_t        *place_of_node, *place_of_face, *place_of_cell;
+  rm_lid         *face; /* [faces of all parcels] number in the mesh */
+  rm_lid         *node; /* [nodes of all parcels]                    */
+  parcels         out;
+} packing;
+
+static int64_t loop_length(const rm_mesh *mesh, rm_lid face)
+{
+  return mesh->face_offset[face + 1] - mesh->face_offset[face];
+}
+
+static remap_status new_places(rm_arena *scratch, rm_lid num, int64_t **out)
+{
+  RM_NEW(*out, scratch, num);
+  for (rm_lid i = 0; i < num; i++) (*out)[i] = -1;
+  return REMAP_OK;
+}
+
+static remap_status new_offsets(rm_arena *arena, int num_ranks, parcels *out)
+{
+  RM_NEW(out->node_offset, arena, (int64_t)num_ranks + 1);
+  RM_NEW(out->face_offset, arena, (int64_t)num_ranks + 1);
+  RM_NEW(out->corner_offset, arena, (int64_t)num_ranks + 1);
+  return REMAP_OK;
+}
+
+/* The faces of every parcel, each once, and how many corners they have. */
+static remap_status list_faces(rm_arena *scratch, packing *p)
+{
+  const rm_mesh  *mesh  = p->mesh;
+  const rm_route *route = p->route;
+  int64_t         most = 0, num = 0, num_corners = 0;
+
+  for (int64_t k = 0; k < route->offset[p->num_ranks]; k++)
+    most += mesh->cell_face_offset[route->cell[k] + 1] - mesh->cell_face_offset[route->cell[k]];
+  RM_NEW(p->face, scratch, most);
+  for (int r = 0; r < p->num_ranks; r++) {
+    p->out.face_offset[r]   = num;
+    p->out.corner_offset[r] = num_corners;
+    for (int64_t k = route->offset[r]; k < route->offset[r + 1]; k++)
+      for (int64_t i = mesh->cell_face_offset[route->cell[k]]; i < mesh->cell_face_offset[route->cell[k] + 1]; i++) {
+        const rm_lid f = mesh->cell_face[i];
+
+        if (p->place_of_face[f] >= p->out.face_offset[r]) continue;
+        p->place_of_face[f] = num;
+        p->face[num++]      = f;
+        num_corners += loop_length(mesh, f);
+      }
+  }
+  p->out.face_offset[p->num_ranks]   = num;
+  p->out.corner_offset[p->num_ranks] = num_corners;
+  return REMAP_OK;
+}
+
+/* A mesh cell's number in rank r's parcel, -1 if it does not go there or is none. */
+static rm_lid cell_in_parcel(const packing *p, int r, rm_lid cell)
+{
+  const int64_t first = p->route->offset[r];
+
+  return cell >= 0 && p->place_of_cell[cell] >= first ? (rm_lid)(p->place_of_cell[cell] - first) : -1;
+}
+
+/* Write face f to rank r's parcel, its loop turned round if only the neighbour goes there. Nodes that are new to the parcel are
+ * appended to its list, *num_nodes of all parcels so far. */
+static void pack_face(packing *p, int r, rm_lid f, wire_face *face, rm_lid *corner, int64_t *num_nodes)
+{
+  const rm_lid  owner = cell_in_parcel(p, r, p->mesh->face_cell[f][0]);
+  const rm_lid  other = cell_in_parcel(p, r, p->mesh->face_cell[f][1]);
+  const rm_lid *loop  = p->mesh->face_node + p->mesh->face_offset[f];
+  const rm_lid  num   = (rm_lid)loop_length(p->mesh, f);
+  const int64_t first = p->out.node_offset[r];
+
+  RM_ASSERT(owner >= 0 || other >= 0);
+  face->num_nodes = num;
+  face->cell[0]   = owner >= 0 ? owner : other;
+  face->cell[1]   = owner >= 0 ? other : -1;
+  face->is_skin   = p->mesh->face_is_skin[f];
+  for (rm_lid i = 0; i < num; i++) {
+    const rm_lid node = loop[owner >= 0 ? i : num - 1 - i];
+
+    if (p->place_of_node[node] < first) {
+      p->place_of_node[node] = *num_nodes;
+      p->node[(*num_nodes)++] = node;
+    }
+    corner[i] = (rm_lid)(p->place_of_node[node] - first);
+  }
+}
+
+static void pack_cell(const rm_mesh *mesh, rm_lid c, wire_cell *cell)
+{
+  cell->global = mesh->cell_global[c];
+  cell->home   = c;
+  cell->volume = mesh->cell_volume[c];
+  memcpy(cell->centroid, mesh->cell_centroid[c], sizeof cell->centroid);
+}
+
+/* The cells, faces and corners of every parcel, and its list of nodes. */
+static remap_status pack_entities(rm_arena *scratch, packing *p)
+{
+  parcels      *out       = &p->out;
+  const int64_t num_cells = p->route->offset[p->num_ranks], num_corners = out->corner_offset[p->num_ranks];
+  int64_t       num_nodes = 0;
+
+  RM_NEW(out->cell, scratch, num_cells);
+  RM_NEW(out->face, scratch, out->face_offset[p->num_ranks]);
+  RM_NEW(out->corner, scratch, num_corners);
+  RM_NEW(p->node, scratch, num_corners);
+  for (int r = 0; r < p->num_ranks; r++) {
+    int64_t corner = out->corner_offset[r];
+
+    out->node_offset[r] = num_nodes;
+    for (int64_t k = p->route->offset[r]; k < p->route->offset[r + 1]; k++) {
+      p->place_of_cell[p->route->cell[k]] = k;
+      pack_cell(p->mesh, p->route->cell[k], &out->cell[k]);
+    }
+    for (int64_t i = out->face_offset[r]; i < out->face_offset[r + 1]; i++) {
+      pack_face(p, r, p->face[i], &out->face[i], out->corner + corner, &num_nodes);
+      corner += out->face[i].num_nodes;
+    }
+    RM_ASSERT(corner == out->corner_offset[r + 1]);
+  }
+  out->node_offset[p->num_ranks] = num_nodes;
+  return REMAP_OK;
+}
+
+/* Not collective. */
+static remap_status pack(rm_arena *scratch, packing *p)
+{
+  RM_TRY(new_offsets(scratch, p->num_ranks, &p->out));
+  RM_TRY(new_places(scratch, p->mesh->num_nodes, &p->place_of_node));
+  RM_TRY(new_places(scratch, p->mesh->num_faces, &p->place_of_face));
+  RM_TRY(new_places(scratch, p->mesh->num_cells, &p->place_of_cell));
+  RM_TRY(list_faces(scratch, p));
+  RM_TRY(pack_entities(scratch, p));
+  RM_NEW(p->out.node, scratch, p->out.node_offset[p->num_ranks]);
+  for (int64_t i = 0; i < p->out.node_offset[p->num_ranks]; i++)
+    memcpy(p->out.node[i], p->mesh->node_xyz[p->node[i]], sizeof p->out.node[i]);
+  return REMAP_OK;
+}
+
+/* Collective. Nodes and corners arrive where they stay. */
+static remap_status exchange(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_route *route, const parcels *out,
+                             parcels *in, int64_t *in_cell_offset)
+{
+  void *node, *corner, *face, *cell;
+
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->node, out->node_offset, out->node, in->node_offset, &node));
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->corner, out->corner_offset, out->corner, in->corner_offset, &corner));
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *out->face, out->face_offset, out->face, in->face_offset, &face));
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *out->cell, route->offset, out->cell, in_cell_offset, &cell));
+  in->node   = node;
+  in->corner = corner;
+  in->face   = face;
+  in->cell   = cell;
+  return REMAP_OK;
+}
+
+/* The faces of a piece. Corners are shifted in place. */
+static remap_status join_faces(rm_arena *arena, int num_ranks, const parcels *in, const int64_t *cell_offset, rm_piece *piece)
+{
+  const int64_t num = in->face_offset[num_ranks];
+  int64_t      *face_offset;
+  rm_lid      (*face_cell)[2];
+  uint8_t      *face_is_skin;
+
+  RM_NEW(face_offset, arena, num + 1);
+  RM_NEW(face_cell, arena, num);
+  RM_NEW(face_is_skin, arena, num);
+  face_offset[0] = 0;
+  for (int r = 0; r < num_ranks; r++) {
+    const rm_lid first_node = (rm_lid)in->node_offset[r], first_cell = (rm_lid)cell_offset[r];
+
+    for (int64_t i = in->face_offset[r]; i < in->face_offset[r + 1]; i++) {
+      const wire_face *face = &in->face[i];
+
+      face_offset[i + 1] = face_offset[i] + face->num_nodes;
+      face_cell[i][0]    = first_cell + face->cell[0];
+      face_cell[i][1]    = face->cell[1] < 0 ? -1 : first_cell + face->cell[1];
+      face_is_skin[i]    = (uint8_t)face->is_skin;
+    }
+    for (int64_t i = in->corner_offset[r]; i < in->corner_offset[r + 1]; i++) in->corner[i] += first_node;
+  }
+  RM_ASSERT(face_offset[num] == in->corner_offset[num_ranks]);
+  piece->num_faces    = (rm_lid)num;
+  piece->face_offset  = face_offset;
+  piece->face_node    = in->corner;
+  piece->face_cell    = (const rm_lid(*)[2])face_cell;
+  piece->face_is_skin = face_is_skin;
+  return REMAP_OK;
+}
+
+static remap_status join_cells(rm_arena *arena, int num_ranks, const parcels *in, const int64_t *cell_offset, rm_piece *piece)
+{
+  const int64_t num = cell_offset[num_ranks];
+  rm_gid       *global;
+  int          *home_rank;
+  rm_lid       *home;
+  double       *volume, (*centroid)[3];
+
+  RM_NEW(global, arena, num);
+  RM_NEW(home_rank, arena, num);
+  RM_NEW(home, arena, num);
+  RM_NEW(volume, arena, num);
+  RM_NEW(centroid, arena, num);
+  for (int r = 0; r < num_ranks; r++)
+    for (int64_t k = cell_offset[r]; k < cell_offset[r + 1]; k++) {
+      const wire_cell *cell = &in->cell[k];
+
+      global[k]    = cell->global;
+      home_rank[k] = r;
+      home[k]      = (rm_lid)cell->home;
+      volume[k]    = cell->volume;
+      memcpy(centroid[k], cell->centroid, sizeof centroid[k]);
+    }
+  piece->num_cells      = (rm_lid)num;
+  piece->cell_global    = global;
+  piece->cell_home_rank = home_rank;
+  piece->cell_home      = home;
+  piece->cell_volume    = volume;
+  piece->cell_centroid  = (const double(*)[3])centroid;
+  return REMAP_OK;
+}
+
+/* Not collective. The piece that the parcels make together. */
+static remap_status join(rm_arena *arena, const rm_comm *comm, remap_side side, const parcels *in, const int64_t *cell_offset,
+                         rm_piece *piece, rm_reason *reason)
+{
+  const int64_t nodes = in->node_offset[comm->size], faces = in->face_offset[comm->size], cells = cell_offset[comm->size];
+
+  if (nodes > INT32_MAX || faces > INT32_MAX || cells > INT32_MAX)
+    return rm_fail(REMAP_TOO_LARGE, reason, (int)side, -1,
+                   "%lld cells, %lld faces and %lld nodes come to one rank, which can number 2^31 - 1 of each; use more ranks",
+                   (long long)cells, (long long)faces, (long long)nodes);
+  piece->num_nodes = (rm_lid)nodes;
+  piece->node_xyz  = (const double(*)[3])in->node;
+  RM_TRY(join_faces(arena, comm->size, in, cell_offset, piece));
+  return join_cells(arena, comm->size, in, cell_offset, piece);
+}
+
+/* Pack, and make room for the offsets of what arrives. Not collective. */
+static remap_status prepare(rm_arena *scratch, packing *p, parcels *in, int64_t **in_cell_offset)
+{
+  RM_TRY(new_offsets(scratch, p->num_ranks, in));
+  RM_NEW(*in_cell_offset, scratch, (int64_t)p->num_ranks + 1);
+  return pack(scratch, p);
+}
+
+remap_status rm_part_ship(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
+                          rm_piece *out, rm_reason *reason)
+{
+  packing  p     = {.mesh = mesh, .route = route, .num_ranks = comm->size};
+  parcels  in    = {0};
+  rm_piece piece = {0};
+  int64_t *in_cell_offset = NULL;
+
+  RM_TRY(rm_comm_agree(comm, prepare(scratch, &p, &in, &in_cell_offset), NULL));
+  RM_TRY(exchange(arena, scratch, comm, route, &p.out, &in, in_cell_offset));
+  RM_TRY(rm_comm_agree_reason(comm, join(arena, comm, mesh->side, &in, in_cell_offset, &piece, reason), reason));
+  *out = piece;
+  return REMAP_OK;
+}
