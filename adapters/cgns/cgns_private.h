@@ -1,0 +1,343 @@
+/* cgns_private.h -- what the files of the adapter share. Nobody else includes it, but the adapter's tests.
+ *
+ *   common.c     status and message, agreement of ranks, growing arrays, hashing, exchange of records
+ *   tree.c       the file's tree as plain data, the same on every rank
+ *   cgio_tree.c  ADF files through cgio           (the only file that includes cgns_io.h)
+ *   h5_tree.c    HDF5 files: tree and slabs       (with h5_write.c the only files that include hdf5.h)
+ *   h5_write.c   HDF5 output from a plan
+ *   file.c       rcgns_open, rcgns_close, reading of slabs from either kind of file
+ *   sids_zone.c  zones and element sections: what is a volume cell, and where its row lies
+ *   sids_mesh.c  this rank's part of the mesh
+ *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
+ *   sids_fields.c  FlowSolution_t: choice, names, values
+ *   sids_write.c   the plan of an output file, rcgns_write, rcgns_create
+ *
+ * Trees are in HDF5's order of dimensions: slowest first. */
+#ifndef REMAP_ADAPTERS_CGNS_PRIVATE_H
+#define REMAP_ADAPTERS_CGNS_PRIVATE_H
+
+#include "cgns.h"
+
+#include <stdbool.h>
+
+enum {
+  RC_MAX_DIMS  = 12,
+  RC_NAME      = 33,       /* 32 characters and NUL */
+  RC_MAX_BOXES = 2 * RC_MAX_DIMS
+};
+
+/* ---- status ------------------------------------------------------------------------------------------------------- */
+
+/* Hand a failure up; only where nothing is owned. */
+#define RC_TRY(call)                              \
+  do {                                            \
+    const rcgns_status rc_try_ = (call);          \
+    if (rc_try_ != RCGNS_OK) return rc_try_;      \
+  } while (0)
+
+/* Hand it up through the one cleanup label; assign is an assignment to the status. */
+#define RC_GOTO(label, assign)                    \
+  do {                                            \
+    if ((assign) != RCGNS_OK) goto label;         \
+  } while (0)
+
+/* Format the message and return the status, so that `return rc_fail(...)` reads as one act. */
+rcgns_status rc_fail(rcgns_message *message, rcgns_status status, const char *format, ...)
+  __attribute__((format(printf, 3, 4)));
+
+/* MEMORY, with the words for it. */
+rcgns_status rc_no_memory(rcgns_message *message);
+
+/* The greatest of the ranks' statuses and the message of the lowest rank that has it. Collective. */
+rcgns_status rc_agree(MPI_Comm comm, rcgns_status mine, rcgns_message *message);
+
+/* Broadcast of any length from rank 0. Collective. */
+void rc_bcast(MPI_Comm comm, void *data, int64_t bytes);
+
+/* ---- memory ------------------------------------------------------------------------------------------------------- */
+
+/* An array that grows: items of one size, owned. All zero is an empty array. */
+typedef struct rc_array {
+  void   *item;
+  int64_t count, capacity;
+} rc_array;
+
+/* Room for `more` further items of `size` bytes. false: no memory, nothing changed. */
+bool rc_reserve(rc_array *array, int64_t more, size_t size);
+/* Append one int64_t. */
+bool rc_push(rc_array *array, int64_t value);
+void rc_drop(rc_array *array);
+/* malloc for count items, never NULL for 0 of them; NULL if the product overflows or memory is short. */
+void *rc_alloc(int64_t count, size_t size);
+
+/* A map from keys of 1 to 4 int64_t to 0, 1, 2 ... in the order they come. All zero is an empty map of no width. */
+typedef struct rc_map {
+  int       width; /* int64_t per key */
+  rc_array  key;   /* [count][width] */
+  int64_t  *slot;  /* [num_slots] index of a key, -1: free */
+  int64_t   num_slots;
+} rc_map;
+
+/* Index of the key, which is added if new; -1: no memory. */
+int64_t rc_map_add(rc_map *map, const int64_t *key);
+void    rc_map_drop(rc_map *map);
+
+/* ---- distribution ------------------------------------------------------------------------------------------------- */
+
+/* First of n items that rank r of size ranks owns; r == size gives n. Shares differ by one at most. */
+int64_t rc_share(int64_t n, int rank, int size);
+/* The rank that owns item i. */
+int rc_owner(int64_t n, int64_t i, int size);
+
+/* Records of `size` bytes to every rank and back: send holds send_count[r] records for rank r, r ascending. *received is
+ * the caller's (free), recv_count [ranks] is filled. Collective, with agreement: mine is the caller's own status so far. */
+rcgns_status rc_exchange(MPI_Comm comm, rcgns_status mine, const void *send, const int64_t *send_count, size_t size,
+                         void **received, int64_t *recv_count, rcgns_message *message);
+
+/* ---- tree --------------------------------------------------------------------------------------------------------- */
+
+/* A node. Links are followed where that is possible: label, payload and children are those of the node they lead to. */
+typedef struct rc_node {
+  char    name[RC_NAME], label[RC_NAME];
+  char    type[3];       /* of the payload: I4 I8 U4 U8 R4 R8 C1 B1 U1 X4 X8; MT: none */
+  char    kind;          /* of the payload: 'I' 'R' 'C' 'X'; '?': of no CGNS type; 0: none */
+  bool    is_link, is_dead; /* dead: a link that leads nowhere */
+  int     file;          /* index of the file that holds the payload */
+  int     nd;
+  int64_t dim[RC_MAX_DIMS];
+  int64_t parent, child, last, next; /* indices of nodes, -1: none */
+  int64_t link_file, link_path; /* links: as stored, offsets of text in the pool */
+  int64_t anchor;        /* offset of the path in `file` where it is not the parent's path and the name; -1 */
+  int64_t small;         /* offset of the payload in the pool if it is small (int64_t, double or char), -1 */
+} rc_node;
+
+/* A file that the tree comes from: 0 is the one that was opened, the others are reached by links. */
+typedef struct rc_source {
+  int64_t path;          /* offset of text in the pool */
+  bool    is_adf;
+  int64_t size, device, inode;
+} rc_source;
+
+/* Node 0 is the root. Read-only once it is broadcast. Invariants: parent < index of node; children are linked in the order
+ * of the file; small payloads have rc_count(node) values, aligned to 8 bytes. */
+typedef struct rc_tree {
+  rc_array node, source, pool; /* rc_node, rc_source, char */
+} rc_tree;
+
+static inline rc_node       *rc_node_at(const rc_tree *tree, int64_t i) { return (rc_node *)tree->node.item + i; }
+static inline rc_source     *rc_source_at(const rc_tree *tree, int64_t i) { return (rc_source *)tree->source.item + i; }
+static inline const char    *rc_text(const rc_tree *tree, int64_t at) { return (const char *)tree->pool.item + at; }
+static inline const int64_t *rc_small_ints(const rc_tree *tree, const rc_node *n)
+{
+  return n->kind == 'I' && n->small >= 0 ? (const int64_t *)(const void *)rc_text(tree, n->small) : NULL;
+}
+
+/* Bytes of one value of the node's type; 0 for MT. */
+int rc_width(const char *type);
+/* Number of values of the payload, -1 if the product overflows. 0 without a payload. */
+int64_t rc_count(const rc_node *node);
+/* Is the payload small enough to travel with the tree? */
+bool rc_is_small(const rc_node *node);
+/* Append a node below parent (-1: the root). -1: no memory. */
+int64_t rc_tree_add(rc_tree *tree, int64_t parent, const rc_node *node);
+/* Append bytes to the pool, aligned to 8; the offset, -1: no memory. */
+int64_t rc_tree_store(rc_tree *tree, const void *bytes, int64_t count);
+/* Append a file; fails on more than 10000. -1: no memory, -2: it cannot be read. */
+int rc_tree_source(rc_tree *tree, const char *path, bool is_adf);
+/* The path of a node in its file; *path is the caller's (free), NULL: no memory. */
+char *rc_tree_path(const rc_tree *tree, int64_t node);
+/* First child of that label (NULL: any) and name (NULL: any) after `after` (-1: from the first); -1: none. */
+int64_t rc_tree_find(const rc_tree *tree, int64_t parent, int64_t after, const char *label, const char *name);
+/* The trimmed text of a small C1 node, cut to fit; empty if it is none. */
+void rc_tree_string(const rc_tree *tree, int64_t node, char *out, size_t size);
+/* Rank 0's tree to all. Collective. */
+rcgns_status rc_tree_bcast(MPI_Comm comm, rc_tree *tree, rcgns_message *message);
+void rc_tree_drop(rc_tree *tree);
+
+/* ---- the two kinds of file ---------------------------------------------------------------------------------------- */
+
+/* A part of an array: the linear range [lo, hi) of the box that begins at origin and has shape, rows slowest first. */
+typedef struct rc_box {
+  int     nd;
+  int64_t origin[RC_MAX_DIMS], shape[RC_MAX_DIMS];
+} rc_box;
+
+/* The whole payload of a node. */
+rc_box rc_whole(const rc_node *node);
+/* Cut the linear range [lo, hi) of the box into at most RC_MAX_BOXES boxes, in order. Returns how many. */
+int rc_box_cut(const rc_box *box, int64_t lo, int64_t hi, rc_box *part);
+int64_t rc_box_count(const rc_box *box);
+
+/* Is it an HDF5 file? Not collective. */
+bool rc_h5_is_file(const char *path);
+/* Read the tree of source `file` into tree, whose node `parent` is that file's root. Not collective. */
+rcgns_status rc_h5_walk(rc_tree *tree, rcgns_message *message);
+/* Open for parallel reading. Collective; the handle is 64-bit, -1 after a failure. */
+rcgns_status rc_h5_open(MPI_Comm comm, const char *path, int64_t *handle, rcgns_message *message);
+void         rc_h5_close(int64_t handle);
+/* Read [lo, hi) of box from the node at path: as 'I' int64_t, 'R' double, 'N' its own type. Collective transfer, and no
+ * agreement: ranks with nothing to read, or with failed != 0, take part with an empty selection. */
+rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
+                        int failed, void *out, rcgns_message *message);
+
+/* The same for ADF, through cgio; every call is for one rank alone. */
+bool         rc_adf_is_file(const char *path);
+rcgns_status rc_adf_walk(rc_tree *tree, rcgns_message *message);
+rcgns_status rc_adf_open(const char *path, int64_t *handle, rcgns_message *message);
+void         rc_adf_close(int64_t handle);
+rcgns_status rc_adf_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
+                         void *out, rcgns_message *message);
+
+/* ---- the file ----------------------------------------------------------------------------------------------------- */
+
+typedef enum rc_shape { RC_NONE, RC_TETRA, RC_PYRA, RC_PENTA, RC_HEXA } rc_shape;
+
+/* How the rows of a section lie in ElementConnectivity. */
+typedef enum rc_layout {
+  RC_FIXED,  /* npe nodes each */
+  RC_MIXED,  /* a type, then its nodes */
+  RC_INLINE, /* a count, then as many */
+  RC_OFFSETS /* ElementStartOffset says */
+} rc_layout;
+
+/* One Elements_t that matters: volume elements or, in zone->face, NGON_n. */
+typedef struct rc_section {
+  int64_t   connectivity, offsets, parents; /* nodes, -1: none */
+  rc_layout layout;
+  bool      is_poly;      /* NFACE_n, or NGON_n in zone->face */
+  rc_shape  shape;        /* RC_FIXED */
+  int       npe;          /* RC_FIXED: nodes per element, mid nodes included */
+  int64_t   first;        /* element number of its first row */
+  int64_t   num_rows, length; /* rows, and values of ElementConnectivity */
+  int64_t   row_lo, row_hi;   /* rows that are no rind */
+  int64_t   num_cells, first_cell; /* volume cells; number of the first in its zone */
+  int64_t   num_cuts;     /* MIXED, INLINE: one cut for each RC_CUT rows and one at the end */
+  int64_t  *cut_at;       /* [num_cuts] where that row begins */
+  int64_t  *cut_cell;     /* [num_cuts] volume cells before it */
+} rc_section;
+
+enum { RC_CUT = 1024 };
+
+typedef struct rc_zone {
+  int64_t     node, base;    /* in the tree */
+  const char *name;          /* "Base/Zone", in the file's names */
+  bool        is_structured;
+  int64_t     vertices[3], cells[3]; /* along i, j, k; unstructured: the first only */
+  int64_t     num_nodes, num_cells, first_cell;
+  int64_t     coordinate[3]; /* nodes */
+  int64_t     rind[6];       /* of the coordinates: i before, i after, ... */
+  int64_t     num_sections, num_faces; /* faces: rows of all of face */
+  rc_section *section;       /* [num_sections] by element number; cells */
+  int64_t     num_face_sections;
+  rc_section *face;          /* [num_face_sections] NGON_n by element number */
+  bool        by_parents;    /* the cells come from ParentElements alone */
+  int64_t     parent_base;   /* by_parents: what ParentElements calls the first cell */
+} rc_zone;
+
+/* This rank's mesh while it grows. */
+typedef struct rc_mesh {
+  rc_array xyz;              /* double[3] */
+  rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
+} rc_mesh;
+
+struct rcgns_file {
+  MPI_Comm   comm;
+  int        rank, size;
+  char      *path;
+  rc_tree    tree;
+  int64_t   *handle;         /* [sources], -1: not open */
+  double     version;
+  double     map[3][4];      /* coordinates: scale and transform in one */
+  int64_t    num_zones;
+  rc_zone   *zone;
+  int64_t    num_cells, cell_lo, cell_hi; /* all ranks; this rank */
+  rc_mesh    build;
+  remap_mesh mesh;
+  const char **zone_name;
+  int64_t   *zone_cell_offset;
+  rc_array   names;          /* char *, owned: every string that info hands out */
+  rc_array   bases, notes;   /* const char *, in names */
+  rcgns_zone_info *zone_info;
+  rcgns_info info;
+  int64_t   *solution;       /* [num_zones] node of the chosen FlowSolution_t, -1 */
+  rcgns_field *field;
+  int64_t    num_fields;
+};
+
+/* A copy of the text, owned by the file; NULL: no memory. */
+const char *rc_keep(rcgns_file *file, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Add a remark, once. The same on all ranks. */
+rcgns_status rc_note(rcgns_file *file, rcgns_message *message, const char *text);
+
+/* Read [lo, hi) of box from a node: as 'I' int64_t, 'R' double, 'N' its own type. Collective, with agreement; mine is the
+ * caller's own status so far, so that a rank in trouble takes the others with it. */
+rcgns_status rc_read(rcgns_file *file, rcgns_status mine, int64_t node, const rc_box *box, int64_t lo, int64_t hi, char as,
+                     void *out, rcgns_message *message);
+/* The same for the whole of a one-dimensional array. */
+rcgns_status rc_read_1d(rcgns_file *file, rcgns_status mine, int64_t node, int64_t lo, int64_t hi, char as, void *out,
+                        rcgns_message *message);
+
+/* Find the zones with volume cells and count them. Collective. */
+rcgns_status rc_zones_find(rcgns_file *file, const char *base, rcgns_message *message);
+void         rc_zones_drop(rcgns_file *file);
+/* Nodes of an element type as files of this version write it: *shape, and how many; 0: unknown. */
+int rc_element(double version, int64_t code, rc_shape *shape);
+/* Corners of a shape. */
+int rc_corners(rc_shape shape);
+/* Rows [lo, hi) of a section that is not FIXED: offset [hi - lo + 1] and data, the type word of MIXED included, the count of
+ * INLINE not. Collective. */
+rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
+                          rc_array *offset, rc_array *data, rcgns_message *message);
+/* The Rind of a node: [2 nd], zero where there is none. false: it is malformed. */
+bool rc_rind(const rc_tree *tree, int64_t parent, int nd, int64_t *rind);
+
+/* This rank's part of the mesh. Collective. */
+rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message);
+
+/* Coordinates of nodes of an unstructured zone. Collective. xyz [n][3]; shared, if not NULL, [n]: more ranks than one ask. */
+rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n, double *xyz,
+                            uint8_t *shared, rcgns_message *message);
+/* One face into the mesh: a loop of local nodes, false: no memory. */
+bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour);
+/* Faces of the cells [lo, hi) (numbers in the zone) of polyhedra; first_cell is the local number of cell lo. Collective. */
+rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
+                           int64_t first_cell, rcgns_message *message);
+/* Six times the volume of the cone from origin to the loop, fanned about its mean. */
+double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin);
+
+/* ---- output ------------------------------------------------------------------------------------------------------- */
+
+typedef enum rc_content { RC_EMPTY, RC_LITERAL, RC_COPY, RC_VALUES, RC_LINK } rc_content;
+
+/* A node of the file to be. */
+typedef struct rc_entry {
+  int64_t     parent;        /* entry; -1: the root of the file */
+  char        name[RC_NAME], label[RC_NAME], type[3];
+  int         nd;
+  int64_t     dim[RC_MAX_DIMS];
+  rc_content  content;
+  const void *literal;       /* LITERAL: int64_t, double or char by kind; borrowed */
+  char        kind;          /* LITERAL */
+  int64_t     node;          /* COPY: of the tree */
+  int64_t     origin[RC_MAX_DIMS]; /* COPY: of the box that is taken */
+  int64_t     zone, field;   /* VALUES */
+  char       *link_file, *link_path; /* LINK: owned; an empty file is this one */
+} rc_entry;
+
+typedef struct rc_plan {
+  rc_array entry;
+} rc_plan;
+
+/* Append an entry; its index, -1: no memory. Type NULL or nd 0: no payload; else literal is written as type. */
+int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char *label, const char *type, int nd,
+                    const int64_t *dim, char kind, const void *literal);
+static inline rc_entry *rc_entry_at(const rc_plan *plan, int64_t i) { return (rc_entry *)plan->entry.item + i; }
+void rc_plan_drop(rc_plan *plan);
+
+/* A new file with every group, attribute and literal of the plan, and room for the rest. Not collective. */
+rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message *message);
+/* Fill what the skeleton left empty. Collective on the file's communicator. */
+rcgns_status rc_h5_fill(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields,
+                        rcgns_message *message);
+
+#endif
