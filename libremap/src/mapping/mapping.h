@@ -42,4 +42,10 @@ remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_fra
 /* Every invariant that one rank can see; slow. Not collective. */
 remap_status rm_mapping_check(const rm_mapping *mapping, const rm_mesh *const mesh[2]);
 
+/* Put n cells into canonical order: by the Morton key of the centroid, then centroid, volume and global id, compared in turn; no
+ * numbering of a rank takes part. order [n] receives places of the arrays, [n] each. Not collective. Working memory from scratch.
+ * NO_MEMORY. O(n). */
+remap_status rm_canonical_order(rm_arena *scratch, const rm_frame *frame, int64_t n, const double (*centroid)[3],
+                                const double *volume, const rm_gid *global, rm_lid *order);
+
 #endif
