@@ -1,9 +1,9 @@
 /* geom -- exact signs, face triangulation, integrals over tetrahedra. Pure: no allocation, no mesh, no state.
  *
  * Signs are exact for coordinates that are 0 or of magnitude 2^-100..2^10 (rm_mesh brings them there): a static or dynamic
- * filter decides nearly always, expansion arithmetic (Shewchuk 1997) the rest. Shared coordinates, axis-parallel and exactly
- * representable differences are answered without long expansions. Needs round-to-nearest IEEE doubles and no contraction:
- * rm_geom_selftest() verifies both.
+ * filter decides nearly always, double-double and integers of fixed capacity (exact.h) the rest. Shared vertices, axis-parallel
+ * differences and coordinates on a common grid are answered in a few nanoseconds. Needs round-to-nearest IEEE doubles and no
+ * contraction: rm_geom_selftest() verifies both.
  *
  * Simulation of simplicity (DESIGN 2.2): mesh 2 is thought translated by (e, e^2, e^3). `moved` says which operand belongs to
  * the translated mesh: +1 the triangle's (the edge is of mesh 1), -1 the edge's or point's (it is of mesh 2). */
@@ -46,10 +46,11 @@ double rm_crossing_parameter(const double p0[3], const double p1[3], const doubl
 enum { RM_CENTRE_POINT = -1 }; /* stands for the mean of the face's vertices in a triangle's corner list */
 
 /* Triangles of a polygon by its vertices' coordinates alone: the result, as a set of triangles in space, does not depend on
- * where the loop starts or which way it runs. xyz is [n][3]; vertices repeated bitwise (next to each other or not) are dropped
- * by coordinates. corner, room for 3 (n + 2) ints, receives indices into xyz or RM_CENTRE_POINT, three per triangle, oriented as
- * the input loop; centre receives the mean when it is used. work is scratch of n ints at least 4 n. Returns the number of
- * triangles, 0 if fewer than 3 distinct vertices are left.
+ * where the loop starts or which way it runs, and its boundary is the loop, edge by edge. xyz is [n][3]. Of points repeated
+ * bitwise: one in a row stays, spikes (b c b) drop out, and where the loop comes back to a point otherwise it is cut into parts
+ * of distinct points, each triangulated as a face of its own (or all by one fan). corner, room for 3 (n + 2) ints, receives
+ * indices into xyz or RM_CENTRE_POINT, three per triangle, oriented as the input loop; centre receives the mean when it is used.
+ * work is scratch of at least 4 n ints. Returns the number of triangles, 0 if no part of 3 vertices is left.
  * Triangle: itself. Exactly coplanar face, or faces == DIAGONAL: as few triangles as possible, shorter diagonal first, ties by
  * coordinates, ears cut off in canonical order where the polygon is concave. CENTRE: fan about the mean, summed in canonical
  * order; if one triangle of the fan runs against the face's area vector, ears as above; if no ear is left, a fan from the
