@@ -1,30 +1,28 @@
-/* moments -- crossings and segments of the overlay in; volume and first moments of every pair out (DESIGN 2.4, 2.6). No
- * polyhedron is built. Sums run in the overlay's canonical order, so they depend on coordinates only. */
+/* moments -- crossings and segments of the overlay in; volume and moments of every pair out (DESIGN 2.4, 2.6). No polyhedron is
+ * built. Sums run in the overlay's canonical order, so they depend on coordinates only. */
 #ifndef RM_MOMENTS_H
 #define RM_MOMENTS_H
 
 #include "overlay/overlay.h"
-#include "part/part.h"
 
 enum {
-  RM_PAIR_SOURCE_SKIN = 1, /* the source mesh's skin passes through the target cell beside or inside this pair: it is partial */
-  RM_PAIR_TARGET_SKIN = 2  /* the target mesh's skin passes through the source cell: that one is partial                     */
+  RM_PAIR_SOURCE_SKIN = 1, /* the source mesh's skin passes through the target cell within this pair: that cell is partial */
+  RM_PAIR_TARGET_SKIN = 2  /* the target mesh's skin passes through the source cell: that one is partial                   */
 };
 
-/* Pairs of this rank's pieces. Read-only once built. Invariants: pairs are sorted by target, and within a target canonically;
- * a pair is listed if its exact volume is not zero; coordinates and volumes are in the mesh room's frame. */
+/* Pairs of this rank's pieces. Read-only once built. Invariants: a pair is listed once, in the order of sources and in no
+ * particular order within a source; it is listed if its exact volume is not zero; coordinates are in the mesh room's frame. */
 typedef struct rm_moments {
-  int64_t       num_pairs;
-  const rm_lid *source, *target; /* [num_pairs] cells of part->piece[0] and [1]                             */
-  const double *volume;          /* [num_pairs]                                                             */
-  const double (*moment)[3];     /* [num_pairs] integral of (x - c), c the source cell's centroid           */
-  const uint8_t *flags;          /* [num_pairs] RM_PAIR_ bits                                               */
-  double        zone_overlap_volume[2]; /* [side] of cells of one mesh with each other on this rank         */
-  rm_gid        zone_overlap_cell[2][2]; /* [side] global ids of the two cells that overlap most, or -1     */
+  int64_t        num_pairs;
+  const rm_lid  *source, *target; /* [num_pairs] cells of part->piece[0] and [1]                                       */
+  const double  *volume;          /* [num_pairs]                                                                       */
+  const double (*moment)[3];      /* [num_pairs] integral of (x - c), c the source cell's centroid                     */
+  const double (*second)[6];      /* [num_pairs] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if not asked */
+  const uint8_t *flags;           /* [num_pairs] RM_PAIR_ bits                                                         */
 } rm_moments;
 
-/* Not collective. The product lives in arena. */
-remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_moments **out,
-                              rm_reason *reason);
+/* degree: 1 for volumes and first moments, 2 for second moments too. Not collective. The product lives in arena. O(crossings);
+ * pairs whose rounding could exceed 2^-29 of the smaller cell are summed again in double-double. */
+remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int degree, const rm_moments **out);
 
 #endif

@@ -1,0 +1,105 @@
+/* overlay -- traces both meshes through each other and pairs the ends of segments (DESIGN 2.3).
+ *
+ * A segment is where triangle t of mesh 1 meets triangle b of mesh 2. Its ends are crossings of an edge of one with the other;
+ * each crossing ends one segment for every triangle at its edge. Ends are filed under t by counting and sorted by b: O(ends), 8
+ * bytes each, for the ends of one triangle are few. */
+#include "overlay/overlay.h"
+
+#include "overlay/trace.h"
+
+enum { MAX_CROSSINGS = 1 << 30 };
+
+/* +1 if triangle boundary h of a star entry runs along the edge. */
+static inline int along(rm_lid star) { return (star & 3) == 2 ? -1 : 1; }
+
+static remap_status file_ends(rm_arena *arena, rm_overlay *o)
+{
+  const rm_trimesh *m1 = o->mesh[0], *m2 = o->mesh[1];
+  const rm_trace   *t1 = &o->trace[0], *t2 = &o->trace[1];
+  int64_t          *offset;
+  rm_end           *end;
+
+  RM_NEW0(offset, arena, (int64_t)m1->num_triangles + 2);
+  for (rm_lid e = 0; e < m1->num_edges; e++)
+    for (rm_lid k = m1->star_offset[e]; k < m1->star_offset[e + 1]; k++) offset[m1->star[k] / 4 + 2] += t1->count[e];
+  for (rm_lid f = 0; f < m2->num_edges; f++) {
+    const rm_lid at_edge = m2->star_offset[f + 1] - m2->star_offset[f];
+    for (int64_t x = t2->first[f]; x < t2->first[f] + t2->count[f]; x++) offset[t2->crossing[x].triangle / 2 + 2] += at_edge;
+  }
+  for (rm_lid t = 0; t < m1->num_triangles; t++) offset[t + 2] += offset[t + 1];
+  RM_NEW(end, arena, offset[m1->num_triangles + 1]);
+  for (rm_lid e = 0; e < m1->num_edges; e++)
+    for (int64_t x = t1->first[e]; x < t1->first[e] + t1->count[e]; x++) {
+      const rm_lid b = t1->crossing[x].triangle / 2;
+      const int    s = t1->crossing[x].triangle & 1 ? -1 : 1;
+      for (rm_lid k = m1->star_offset[e]; k < m1->star_offset[e + 1]; k++)
+        end[offset[m1->star[k] / 4 + 1]++] = (rm_end){b, 4 * (uint32_t)x + (along(m1->star[k]) * s < 0)};
+    }
+  for (rm_lid f = 0; f < m2->num_edges; f++)
+    for (int64_t x = t2->first[f]; x < t2->first[f] + t2->count[f]; x++) {
+      const rm_lid t = t2->crossing[x].triangle / 2;
+      const int    s = t2->crossing[x].triangle & 1 ? -1 : 1;
+      for (rm_lid k = m2->star_offset[f]; k < m2->star_offset[f + 1]; k++)
+        end[offset[t + 1]++] = (rm_end){m2->star[k] / 4, 4 * (uint32_t)x + 2 + (along(m2->star[k]) * s > 0)};
+    }
+  o->end_offset = offset;
+  o->end        = end;
+  return REMAP_OK;
+}
+
+static inline bool comes_after(rm_end a, rm_end b) { return a.other != b.other ? a.other > b.other : (a.at & 1) > (b.at & 1); }
+
+/* Sort the ends of every triangle; false if one segment has not exactly one start and one end, *bad is then its triangle. */
+static bool pair_ends(const rm_overlay *o, rm_end *end, rm_lid *bad)
+{
+  for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++) {
+    const int64_t first = o->end_offset[t], last = o->end_offset[t + 1];
+
+    for (int64_t i = first + 1; i < last; i++) {
+      const rm_end x = end[i];
+      int64_t      k = i;
+      for (; k > first && comes_after(end[k - 1], x); k--) end[k] = end[k - 1];
+      end[k] = x;
+    }
+    *bad = t;
+    if ((last - first) & 1) return false;
+    for (int64_t i = first; i < last; i += 2) {
+      if (end[i].other != end[i + 1].other || (end[i].at & 1) || !(end[i + 1].at & 1)) return false;
+      if (i + 2 < last && end[i + 2].other == end[i].other) return false;
+    }
+  }
+  return true;
+}
+
+/* Global id of a cell beside a triangle. */
+static rm_gid cell_beside(const rm_trimesh *m, const rm_piece *piece, rm_lid t)
+{
+  const rm_lid c = m->side[t][0] >= 0 ? m->side[t][0] : m->side[t][1];
+  return c >= 0 ? piece->cell_global[c] : -1;
+}
+
+remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
+                              const rm_overlay **out, rm_reason *reason)
+{
+  rm_overlay *o;
+  rm_lid      bad = 0;
+
+  RM_NEW0(o, arena, 1);
+  for (int side = 0; side < 2; side++) o->mesh[side] = mesh[side];
+  for (int side = 0; side < 2; side++) {
+    const remap_status status =
+        rm_trace_build(arena, mesh[side], mesh[1 - side], side == 0 ? 1 : -1, progress, &o->trace[side], &bad);
+    if (status == REMAP_INCONSISTENT)
+      return rm_fail(status, reason, side, cell_beside(mesh[side], &part->piece[side], mesh[side]->star[mesh[side]->star_offset[bad]] / 4),
+                     "an edge of this cell arrives in another cell of the other mesh than its neighbours do; please report both meshes");
+    RM_TRY(status);
+    if (o->trace[side].num_crossings > MAX_CROSSINGS)
+      return rm_fail(REMAP_TOO_LARGE, reason, side, -1, "more than 2^30 crossings on one rank; use more ranks");
+  }
+  RM_TRY(file_ends(arena, o));
+  if (!pair_ends(o, (rm_end *)o->end, &bad))
+    return rm_fail(REMAP_INCONSISTENT, reason, REMAP_SOURCE, cell_beside(mesh[0], &part->piece[0], bad),
+                   "a face of this cell meets the other mesh in a segment without two ends; please report both meshes");
+  *out = o;
+  return REMAP_OK;
+}

@@ -1,0 +1,111 @@
+/* overlay -- a rank's pieces of both meshes in; crossings and segments out (DESIGN 2.1-2.3).
+ *
+ *   trimesh   a piece of one mesh, triangulated, in canonical order: ids ascend with coordinates, so that whatever is summed
+ *             in the order of ids is summed in an order that no partition and no numbering can change
+ *   trace     the crossings of every edge of one mesh with the triangles of the other, by walking from cell to cell, and the
+ *             state (the cells it lies in) of every piece between them
+ *   overlay   both traces, and the segments in which triangles of the two meshes meet
+ *
+ * Both checks of DESIGN 2.3 are always on: every segment has one start and one end, and every edge arrives at each of its ends
+ * with the state that all other edges bring there. INCONSISTENT with the cell's id if one ever fails. */
+#ifndef RM_OVERLAY_H
+#define RM_OVERLAY_H
+
+#include "part/part.h"
+
+enum {
+  RM_OUTSIDE = -1 /* the state of a point in no cell; a missing side of a triangle */
+};
+
+/* Read-only once built. Invariants:
+ *   vertices are distinct and ascend in (Morton key, x, y, z); triangles have ascending corners and ascend lexicographically
+ *   except that copies of one triangle that do not join stand side by side; edges ascend lexicographically;
+ *   the normal of a triangle, (v1 - v0) x (v2 - v0), points from its left cell to its right one;
+ *   edge h of a triangle joins corners (0,1), (1,2), (0,2): its boundary runs along the first two and against the third. */
+typedef struct rm_trimesh {
+  rm_lid         num_vertices, num_triangles, num_edges, num_cells, num_skin;
+  const double (*vertex)[3];            /* [num_vertices]                                                        */
+  const rm_lid (*triangle)[3];          /* [num_triangles] vertices                                              */
+  const rm_lid (*triangle_edge)[3];     /* [num_triangles]                                                       */
+  const rm_lid (*side)[2];              /* [num_triangles] left and right cell, RM_OUTSIDE where there is none   */
+  const uint8_t *triangle_is_skin;      /* [num_triangles] 1: skin of the whole mesh, not only of this piece     */
+  const double (*normal)[3];            /* [num_triangles] rounded; magnitude is twice the area                  */
+  const rm_lid (*edge)[2];              /* [num_edges] vertices, ascending                                       */
+  const rm_lid  *star_offset;           /* [num_edges + 1]                                                       */
+  const rm_lid  *star;                  /* [3 num_triangles] 4 * triangle + h of every triangle at the edge      */
+  const rm_lid  *vertex_edge_offset;    /* [num_vertices + 1]                                                    */
+  const rm_lid  *vertex_edge;           /* [2 num_edges] edges at a vertex, ascending                            */
+  const rm_lid  *cell_triangle_offset;  /* [num_cells + 1]                                                       */
+  const rm_lid  *cell_triangle;         /* 2 * triangle + (1 if the cell is its right one), ascending            */
+  const rm_lid  *cell_vertex_offset;    /* [num_cells + 1] a cell of many triangles has none of what follows     */
+  const rm_lid  *cell_vertex;           /* vertices of the cell                                                  */
+  const rm_lid  *cell_edge_offset;      /* [num_cells + 1]                                                       */
+  const rm_lid  *cell_edge;             /* edges of the cell                                                     */
+  const uint8_t (*cell_edge_end)[2];    /* [same] their ends, as places in the cell's vertices                   */
+  const uint8_t (*cell_triangle_edge)[3]; /* [cell_triangle_offset[num_cells]] as places in the cell's edges     */
+  const double (*cell_box)[6];          /* [num_cells] min x, y, z, max x, y, z                                  */
+  const uint8_t *cell_by_tree;          /* [num_cells] 1: walking by adjacency is not allowed here (DESIGN 2.3)  */
+  double         box[6];                /* of all vertices; min > max if there are none                          */
+  const rm_lid  *skin;                  /* [num_skin] triangles with one side only, ascending                    */
+  const double (*skin_box)[6];          /* [num_skin]                                                            */
+  const rm_boxtree *skin_tree;          /* over skin_box                                                         */
+} rm_trimesh;
+
+/* Triangulate a piece. Not collective. Lives in arena. O(n). TOO_LARGE beyond 2^29 triangles. */
+remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
+                              const rm_trimesh **out);
+/* Every invariant above; slow. Not collective. */
+remap_status rm_trimesh_check(const rm_trimesh *mesh);
+
+/* A crossing of an edge with a triangle of the other mesh. */
+typedef struct rm_crossing {
+  double lambda;   /* where on the edge, 0..1 from its first vertex; a function of the coordinates alone */
+  rm_lid triangle; /* 2 * triangle + (1 if the edge runs against its normal)                             */
+  rm_lid state;    /* behind the crossing, seen along the edge                                           */
+} rm_crossing;
+
+/* A cell and how often it winds about a point. */
+typedef struct rm_winding {
+  rm_lid  cell;
+  int32_t number; /* not 0 */
+} rm_winding;
+
+/* How the edges of one mesh run through the other. A state >= 0 is the one cell, with number 1; RM_OUTSIDE none; below that,
+ * the list num = -2 - state of `winding`. Read-only once built. Invariants: crossings of an edge stand in their exact order. */
+typedef struct rm_trace {
+  int64_t            num_crossings;
+  const rm_crossing *crossing;      /* [num_crossings] edge after edge, but not in the order of edges    */
+  const int64_t     *first;         /* [num_edges] an edge's first crossing                              */
+  const rm_lid      *count;         /* [num_edges] number of its crossings                               */
+  const rm_lid      *state;         /* [num_edges] before the first crossing                             */
+  const rm_lid      *list_offset;   /* [num_lists + 1]                                                   */
+  const rm_winding  *winding;       /* [list_offset[num_lists]] ascending by cell within a list          */
+  rm_lid             num_lists;
+} rm_trace;
+
+/* One end of a segment. Ends of one segment stand side by side, its start (directed along n_t x n_b) first. */
+typedef struct rm_end {
+  rm_lid   other; /* triangle of mesh 2                                                             */
+  uint32_t at;    /* 4 * crossing + 2 * (1 if of an edge of mesh 2) + (1 if the segment's last end)    */
+} rm_end;
+
+/* Read-only once built. */
+typedef struct rm_overlay {
+  const rm_trimesh *mesh[2];
+  rm_trace          trace[2];       /* [0] edges of mesh 1 through mesh 2, [1] the reverse                  */
+  const int64_t    *end_offset;     /* [triangles of mesh 1 + 1]                                            */
+  const rm_end     *end;            /* ascending by `other` within a triangle: twice its number of segments */
+} rm_overlay;
+
+/* Called now and then; not 0 cancels. */
+typedef struct rm_progress {
+  int (*call)(void *user, const char *phase, double done);
+  void *user;
+} rm_progress;
+
+/* Trace both ways and pair the segments. Not collective. Lives in arena. O(n + crossings), expected. reason names a cell by the
+ * global ids in piece. CANCELLED if progress (may be NULL) says so. */
+remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
+                              const rm_overlay **out, rm_reason *reason);
+
+#endif

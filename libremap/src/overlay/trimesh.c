@@ -1,0 +1,586 @@
+/* trimesh -- triangulates a piece of a mesh and puts it in canonical order (DESIGN 2.1, 2.5).
+ *
+ * Points are sorted by Morton key, triangles and edges are bucketed by their lowest vertex: O(n) time. About 480 bytes per
+ * hexahedron with `diagonal`, 900 with `centre`. */
+#include "overlay/overlay.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+  MAX_LOCAL_EDGES = 250, /* a cell with more is walked through by the box tree */
+  MAX_TRIANGLES   = 1 << 29
+};
+
+/* One triangle as a face of one cell, before joining. */
+typedef struct corner_triple {
+  rm_lid  v[3];  /* ascending vertices */
+  rm_lid  cell;  /* the cell beside it */
+  uint8_t right; /* 1: the cell is on the side the normal points to */
+  uint8_t skin;
+} corner_triple;
+
+typedef struct builder {
+  rm_arena       *scratch;
+  const rm_frame *frame;
+  const rm_piece *piece;
+  double        (*point)[3]; /* nodes, then centres */
+  int64_t         num_points;
+  int64_t         num_raw;
+  int64_t       (*raw)[3];   /* [num_raw] points, oriented as the face        */
+  rm_lid         *raw_face;  /* [num_raw]                                     */
+} builder;
+
+/* ---- triangulation of the faces -------------------------------------------------------------------------------- */
+
+static remap_status triangulate_faces(builder *b, remap_faces faces)
+{
+  const rm_piece *p = b->piece;
+  int64_t         longest = 3, most = 0;
+  double        (*xyz)[3];
+  int            *corner, *work;
+
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    const int64_t n = p->face_offset[f + 1] - p->face_offset[f];
+    longest = n > longest ? n : longest;
+    most += n; /* no triangulation of n corners has more than n triangles */
+  }
+  if (longest > INT32_MAX / 8 || most > MAX_TRIANGLES) return REMAP_TOO_LARGE;
+  RM_NEW(xyz, b->scratch, longest);
+  RM_NEW(corner, b->scratch, 3 * (longest + 2));
+  RM_NEW(work, b->scratch, 4 * longest + 16);
+  RM_NEW(b->point, b->scratch, (int64_t)p->num_nodes + p->num_faces);
+  RM_NEW(b->raw, b->scratch, most);
+  RM_NEW(b->raw_face, b->scratch, most);
+  if (p->num_nodes) memcpy(b->point, p->node_xyz, sizeof *b->point * (size_t)p->num_nodes);
+  b->num_points = p->num_nodes;
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    const rm_lid *node = p->face_node + p->face_offset[f];
+    const int     n    = (int)(p->face_offset[f + 1] - p->face_offset[f]);
+    double        centre[3];
+    bool          used = false;
+
+    for (int k = 0; k < n; k++) memcpy(xyz[k], p->node_xyz[node[k]], sizeof *xyz);
+    const int num = rm_triangulate((const double (*)[3])xyz, n, faces, corner, centre, work);
+    RM_ASSERT(num <= n);
+    for (int k = 0; k < num; k++) {
+      for (int h = 0; h < 3; h++) {
+        const int c = corner[3 * k + h];
+        used |= c == RM_CENTRE_POINT;
+        b->raw[b->num_raw][h] = c == RM_CENTRE_POINT ? b->num_points : node[c];
+      }
+      b->raw_face[b->num_raw++] = f;
+    }
+    if (used) memcpy(b->point[b->num_points++], centre, sizeof centre);
+  }
+  return REMAP_OK;
+}
+
+/* ---- vertices ---------------------------------------------------------------------------------------------------- */
+
+static int compare_points(const double a[3], const double b[3])
+{
+  for (int c = 0; c < 3; c++)
+    if (a[c] != b[c]) return a[c] < b[c] ? -1 : 1;
+  return 0;
+}
+
+/* Sorted distinct points become vertices; vertex_of[point]. */
+static remap_status number_vertices(rm_arena *arena, builder *b, rm_lid *vertex_of, rm_trimesh *m)
+{
+  const int64_t n = b->num_points;
+  rm_keyed     *key, *spare;
+  double      (*vertex)[3];
+  rm_lid        count = 0;
+
+  if (n > INT32_MAX) return REMAP_TOO_LARGE;
+  RM_NEW(key, b->scratch, n);
+  RM_NEW(spare, b->scratch, n);
+  for (int64_t i = 0; i < n; i++) {
+    for (int c = 0; c < 3; c++) b->point[i][c] += 0.0; /* a mean may be -0 */
+    key[i] = (rm_keyed){rm_morton(b->frame, b->point[i]), i};
+  }
+  rm_sort_keyed(key, spare, n);
+  for (int64_t i = 1; i < n; i++) { /* ties by coordinates; nearly sorted, so insertion */
+    const rm_keyed x = key[i];
+    int64_t        k = i;
+    while (k > 0 && key[k - 1].key == x.key && compare_points(b->point[key[k - 1].item], b->point[x.item]) > 0) {
+      key[k] = key[k - 1];
+      k--;
+    }
+    key[k] = x;
+  }
+  RM_NEW(vertex, arena, n);
+  for (int64_t i = 0; i < n; i++) {
+    const double *p = b->point[key[i].item];
+    if (!count || compare_points(vertex[count - 1], p)) memcpy(vertex[count++], p, sizeof *vertex);
+    vertex_of[key[i].item] = count - 1;
+  }
+  m->vertex       = (const double (*)[3])vertex;
+  m->num_vertices = count;
+  return REMAP_OK;
+}
+
+/* ---- triangles --------------------------------------------------------------------------------------------------- */
+
+static int compare_triples(const corner_triple *a, const corner_triple *b)
+{
+  if (a->v[1] != b->v[1]) return a->v[1] < b->v[1] ? -1 : 1;
+  if (a->v[2] != b->v[2]) return a->v[2] < b->v[2] ? -1 : 1;
+  return (int)a->right - (int)b->right;
+}
+
+/* Every triangle once per cell beside it, bucketed by its lowest vertex and sorted within the bucket. */
+static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, rm_lid num_vertices, corner_triple **out, int64_t *num)
+{
+  const rm_piece *p = b->piece;
+  int64_t        *offset, n = 0;
+  corner_triple  *triple;
+
+  RM_NEW0(offset, b->scratch, (int64_t)num_vertices + 2);
+  for (int64_t k = 0; k < b->num_raw; k++) {
+    const rm_lid *cell = p->face_cell[b->raw_face[k]];
+    rm_lid        low  = INT32_MAX;
+    for (int h = 0; h < 3; h++) low = vertex_of[b->raw[k][h]] < low ? vertex_of[b->raw[k][h]] : low;
+    offset[low + 2] += 1 + (cell[1] >= 0);
+  }
+  for (rm_lid v = 0; v < num_vertices; v++) offset[v + 2] += offset[v + 1];
+  n = offset[num_vertices + 1];
+  if (n > MAX_TRIANGLES) return REMAP_TOO_LARGE;
+  RM_NEW(triple, b->scratch, n);
+  for (int64_t k = 0; k < b->num_raw; k++) {
+    const rm_lid  face = b->raw_face[k];
+    corner_triple t    = {{vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, 0, p->face_is_skin[face]};
+    int           odd  = 0;
+
+    if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
+    if (t.v[1] > t.v[2]) { const rm_lid s = t.v[1]; t.v[1] = t.v[2], t.v[2] = s, odd ^= 1; }
+    if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
+    for (int h = 0; h < 2; h++) {
+      t.cell  = p->face_cell[face][h];
+      t.right = (uint8_t)(odd ^ h); /* the face's normal points out of its owner, which is therefore on the left */
+      if (t.cell >= 0) triple[offset[t.v[0] + 1]++] = t;
+    }
+  }
+  for (rm_lid v = 0; v < num_vertices; v++)
+    for (int64_t i = offset[v] + 1; i < offset[v + 1]; i++) {
+      const corner_triple x = triple[i];
+      int64_t             k = i;
+      while (k > offset[v] && compare_triples(&triple[k - 1], &x) > 0) {
+        triple[k] = triple[k - 1];
+        k--;
+      }
+      triple[k] = x;
+    }
+  *out = triple;
+  *num = n;
+  return REMAP_OK;
+}
+
+/* Join the two copies of a triangle that lie on opposite sides; any other number of copies stays apart, each a skin. */
+static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
+{
+  rm_lid (*triangle)[3], (*side)[2];
+  uint8_t *skin;
+  rm_lid   count = 0;
+
+  RM_NEW(triangle, arena, num);
+  RM_NEW(side, arena, num);
+  RM_NEW(skin, arena, num);
+  for (int64_t i = 0; i < num;) {
+    int64_t k = i + 1;
+    while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
+    const bool joined = k == i + 2 && triple[i].right != triple[i + 1].right;
+    for (; i < k; i += 1 + joined) {
+      memcpy(triangle[count], triple[i].v, sizeof *triangle);
+      side[count][0] = side[count][1] = RM_OUTSIDE;
+      side[count][triple[i].right]    = triple[i].cell;
+      if (joined) side[count][triple[i + 1].right] = triple[i + 1].cell;
+      skin[count++] = !joined && triple[i].skin;
+    }
+  }
+  m->num_triangles    = count;
+  m->triangle         = (const rm_lid (*)[3])triangle;
+  m->side             = (const rm_lid (*)[2])side;
+  m->triangle_is_skin = skin;
+  return REMAP_OK;
+}
+
+static void triangle_normal(const rm_trimesh *m, rm_lid t, double n[3])
+{
+  const double *a = m->vertex[m->triangle[t][0]], *b = m->vertex[m->triangle[t][1]], *c = m->vertex[m->triangle[t][2]];
+  const double  e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, f[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+
+  n[0] = e[1] * f[2] - e[2] * f[1];
+  n[1] = e[2] * f[0] - e[0] * f[2];
+  n[2] = e[0] * f[1] - e[1] * f[0];
+}
+
+/* ---- edges ------------------------------------------------------------------------------------------------------- */
+
+typedef struct half_edge {
+  rm_lid high; /* upper vertex */
+  rm_lid at;   /* 4 * triangle + h */
+} half_edge;
+
+static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+{
+  static const int low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
+  const rm_lid nt = m->num_triangles, nv = m->num_vertices;
+  const int64_t n3 = 3 * (int64_t)nt;
+  rm_lid (*triangle_edge)[3], (*edge)[2], *star_offset, *star, *offset, ne = 0;
+  half_edge *half;
+
+  RM_NEW0(offset, scratch, (int64_t)nv + 2);
+  RM_NEW(half, scratch, n3);
+  for (rm_lid t = 0; t < nt; t++)
+    for (int h = 0; h < 3; h++) offset[m->triangle[t][low[h]] + 2]++;
+  for (rm_lid v = 0; v < nv; v++) offset[v + 2] += offset[v + 1];
+  for (rm_lid t = 0; t < nt; t++)
+    for (int h = 0; h < 3; h++) half[offset[m->triangle[t][low[h]] + 1]++] = (half_edge){m->triangle[t][high[h]], 4 * t + h};
+  RM_NEW(triangle_edge, arena, nt);
+  RM_NEW(edge, arena, n3);
+  RM_NEW(star_offset, arena, n3 + 1);
+  RM_NEW(star, arena, n3);
+  for (rm_lid v = 0; v < nv; v++) {
+    for (rm_lid i = offset[v] + 1; i < offset[v + 1]; i++) { /* stable, so that the triangles of an edge ascend */
+      const half_edge x = half[i];
+      rm_lid          k = i;
+      while (k > offset[v] && half[k - 1].high > x.high) {
+        half[k] = half[k - 1];
+        k--;
+      }
+      half[k] = x;
+    }
+    for (rm_lid i = offset[v]; i < offset[v + 1]; i++) {
+      if (i == offset[v] || half[i].high != half[i - 1].high) {
+        star_offset[ne] = i;
+        edge[ne][0]     = v;
+        edge[ne++][1]   = half[i].high;
+      }
+      star[i] = half[i].at;
+      triangle_edge[half[i].at / 4][half[i].at % 4] = ne - 1;
+    }
+  }
+  star_offset[ne]  = (rm_lid)n3;
+  m->num_edges     = ne;
+  m->edge          = (const rm_lid (*)[2])edge;
+  m->triangle_edge = (const rm_lid (*)[3])triangle_edge;
+  m->star_offset   = star_offset;
+  m->star          = star;
+  return REMAP_OK;
+}
+
+static remap_status edges_at_vertices(rm_arena *arena, rm_trimesh *m)
+{
+  rm_lid *offset, *list;
+
+  RM_NEW0(offset, arena, (int64_t)m->num_vertices + 2);
+  RM_NEW(list, arena, 2 * (int64_t)m->num_edges);
+  for (rm_lid e = 0; e < m->num_edges; e++)
+    for (int h = 0; h < 2; h++) offset[m->edge[e][h] + 2]++;
+  for (rm_lid v = 0; v < m->num_vertices; v++) offset[v + 2] += offset[v + 1];
+  for (rm_lid e = 0; e < m->num_edges; e++)
+    for (int h = 0; h < 2; h++) list[offset[m->edge[e][h] + 1]++] = e;
+  m->vertex_edge_offset = offset;
+  m->vertex_edge        = list;
+  return REMAP_OK;
+}
+
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
+
+static remap_status triangles_of_cells(rm_arena *arena, rm_trimesh *m)
+{
+  rm_lid *offset, *list;
+
+  RM_NEW0(offset, arena, (int64_t)m->num_cells + 2);
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 2; h++)
+      if (m->side[t][h] >= 0) offset[m->side[t][h] + 2]++;
+  for (rm_lid c = 0; c < m->num_cells; c++) offset[c + 2] += offset[c + 1];
+  RM_NEW(list, arena, offset[m->num_cells + 1]);
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 2; h++)
+      if (m->side[t][h] >= 0) list[offset[m->side[t][h] + 1]++] = 2 * t + h;
+  m->cell_triangle_offset = offset;
+  m->cell_triangle        = list;
+  return REMAP_OK;
+}
+
+/* The place of x in list[0..*n), appended if it is new; -1 if there is no room. */
+static int place_of(rm_lid x, rm_lid *list, int *n, int room)
+{
+  for (int k = 0; k < *n; k++)
+    if (list[k] == x) return k;
+  if (*n == room) return -1;
+  list[*n] = x;
+  return (*n)++;
+}
+
+static remap_status edges_of_cells(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+{
+  const int64_t num_sides = m->cell_triangle_offset[m->num_cells];
+  rm_lid       *edge_offset, *vertex_offset, *edge, *vertex, *edge_list, *vertex_list;
+  uint8_t     (*edge_end)[2], (*end_list)[2], (*triangle_edge)[3];
+  rm_lid        ne = 0, nv = 0;
+
+  RM_NEW(edge_offset, arena, (int64_t)m->num_cells + 1);
+  RM_NEW(vertex_offset, arena, (int64_t)m->num_cells + 1);
+  RM_NEW(triangle_edge, arena, num_sides);
+  RM_NEW(edge_list, scratch, 3 * num_sides);
+  RM_NEW(vertex_list, scratch, 3 * num_sides);
+  RM_NEW(end_list, scratch, 3 * num_sides);
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    rm_lid *own_edge = edge_list + ne, *own_vertex = vertex_list + nv;
+    int     n = 0, k = 0, fits = 1;
+
+    edge_offset[c]   = ne;
+    vertex_offset[c] = nv;
+    for (rm_lid a = m->cell_triangle_offset[c]; fits && a < m->cell_triangle_offset[c + 1]; a++)
+      for (int h = 0; h < 3; h++) {
+        const rm_lid e = m->triangle_edge[m->cell_triangle[a] / 2][h];
+        const int before = n, at = place_of(e, own_edge, &n, MAX_LOCAL_EDGES);
+
+        if (!(fits = at >= 0)) break;
+        triangle_edge[a][h] = (uint8_t)at;
+        if (n == before) continue;
+        for (int g = 0; g < 2; g++) /* at most two new vertices per new edge of a connected surface: fewer than 256 */
+          end_list[ne + at][g] = (uint8_t)place_of(m->edge[e][g], own_vertex, &k, 2 * MAX_LOCAL_EDGES);
+        fits = k < 256;
+        if (!fits) break;
+      }
+    if (fits) ne += n, nv += k;
+  }
+  edge_offset[m->num_cells]   = ne;
+  vertex_offset[m->num_cells] = nv;
+  RM_NEW(edge, arena, ne);
+  RM_NEW(vertex, arena, nv);
+  RM_NEW(edge_end, arena, ne);
+  memcpy(edge, edge_list, sizeof *edge * (size_t)ne);
+  memcpy(vertex, vertex_list, sizeof *vertex * (size_t)nv);
+  memcpy(edge_end, end_list, sizeof *edge_end * (size_t)ne);
+  m->cell_edge_offset   = edge_offset;
+  m->cell_edge          = edge;
+  m->cell_edge_end      = (const uint8_t (*)[2])edge_end;
+  m->cell_vertex_offset = vertex_offset;
+  m->cell_vertex        = vertex;
+  m->cell_triangle_edge = (const uint8_t (*)[3])triangle_edge;
+  return REMAP_OK;
+}
+
+static void empty_box(double box[6])
+{
+  for (int c = 0; c < 3; c++) box[c] = INFINITY, box[c + 3] = -INFINITY;
+}
+static void widen_box(double box[6], const double p[3])
+{
+  for (int c = 0; c < 3; c++) {
+    box[c]     = p[c] < box[c] ? p[c] : box[c];
+    box[c + 3] = p[c] > box[c + 3] ? p[c] : box[c + 3];
+  }
+}
+
+static remap_status boxes(rm_arena *arena, rm_trimesh *m)
+{
+  double (*cell_box)[6];
+
+  RM_NEW(cell_box, arena, m->num_cells);
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    empty_box(cell_box[c]);
+    for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++)
+      for (int h = 0; h < 3; h++) widen_box(cell_box[c], m->vertex[m->triangle[m->cell_triangle[a] / 2][h]]);
+  }
+  m->cell_box = (const double (*)[6])cell_box;
+  empty_box(m->box);
+  for (rm_lid v = 0; v < m->num_vertices; v++) widen_box(m->box, m->vertex[v]);
+  return REMAP_OK;
+}
+
+/* ---- skin -------------------------------------------------------------------------------------------------------- */
+
+static remap_status collect_skin(rm_arena *arena, rm_trimesh *m)
+{
+  rm_lid *skin;
+  double (*box)[6];
+  rm_lid  n = 0;
+
+  for (rm_lid t = 0; t < m->num_triangles; t++) n += m->side[t][0] < 0 || m->side[t][1] < 0;
+  RM_NEW(skin, arena, n);
+  RM_NEW(box, arena, n);
+  n = 0;
+  for (rm_lid t = 0; t < m->num_triangles; t++) {
+    if (m->side[t][0] >= 0 && m->side[t][1] >= 0) continue;
+    empty_box(box[n]);
+    for (int h = 0; h < 3; h++) widen_box(box[n], m->vertex[m->triangle[t][h]]);
+    skin[n++] = t;
+  }
+  m->num_skin = n;
+  m->skin     = skin;
+  m->skin_box = (const double (*)[6])box;
+  return rm_boxtree_build(arena, n, m->skin_box, &m->skin_tree);
+}
+
+/* Mark every vertex about which the skin closes more than once, or an edge of which has not two skin triangles: there, cells that
+ * share a vertex need not be neighbours. A skin triangle hangs on the others at a vertex through its two edges there. */
+static remap_status pinched_vertices(rm_arena *scratch, const rm_trimesh *m, uint8_t *pinched)
+{
+  rm_lid *offset, *list, *seen;
+
+  RM_NEW0(offset, scratch, (int64_t)m->num_vertices + 2);
+  RM_NEW(list, scratch, 3 * (int64_t)m->num_skin);
+  RM_NEW(seen, scratch, 3 * (int64_t)m->num_skin);
+  for (rm_lid s = 0; s < m->num_skin; s++)
+    for (int h = 0; h < 3; h++) offset[m->triangle[m->skin[s]][h] + 2]++;
+  for (rm_lid v = 0; v < m->num_vertices; v++) offset[v + 2] += offset[v + 1];
+  for (rm_lid s = 0; s < m->num_skin; s++)
+    for (int h = 0; h < 3; h++) list[offset[m->triangle[m->skin[s]][h] + 1]++] = m->skin[s];
+  for (rm_lid s = 0; s < m->num_skin; s++)
+    for (int h = 0; h < 3; h++) {
+      const rm_lid e = m->triangle_edge[m->skin[s]][h];
+      int          n = 0;
+      for (rm_lid k = m->star_offset[e]; k < m->star_offset[e + 1]; k++)
+        n += m->side[m->star[k] / 4][0] < 0 || m->side[m->star[k] / 4][1] < 0;
+      if (n != 2) pinched[m->edge[e][0]] = pinched[m->edge[e][1]] = 1;
+    }
+  for (rm_lid v = 0; v < m->num_vertices; v++) {
+    const rm_lid *own = list + offset[v], n = offset[v + 1] - offset[v];
+    rm_lid       *queue = seen, reached = 1;
+
+    if (n < 2 || pinched[v]) continue;
+    queue[0] = own[0];
+    for (rm_lid q = 0; q < reached; q++)
+      for (rm_lid k = 0; k < n; k++) {
+        int    shared = 0, known = 0;
+        for (int g = 0; g < 3; g++)
+          for (int h = 0; h < 3; h++)
+            shared += m->triangle_edge[queue[q]][g] == m->triangle_edge[own[k]][h] &&
+                      (m->edge[m->triangle_edge[own[k]][h]][0] == v || m->edge[m->triangle_edge[own[k]][h]][1] == v);
+        if (!shared) continue;
+        for (rm_lid r = 0; r < reached; r++) known |= queue[r] == own[k];
+        if (!known) queue[reached++] = own[k];
+      }
+    if (reached < n) pinched[v] = 1;
+  }
+  return REMAP_OK;
+}
+
+/* ---- where walking by adjacency is allowed ----------------------------------------------------------------------- */
+
+typedef struct nearness {
+  const rm_trimesh *m;
+  rm_lid            cell;
+} nearness;
+
+static int is_foreign_skin(void *user, rm_lid s)
+{
+  const nearness   *near = user;
+  const rm_trimesh *m    = near->m;
+  const rm_lid     *v    = m->triangle[m->skin[s]];
+
+  for (rm_lid k = m->cell_vertex_offset[near->cell]; k < m->cell_vertex_offset[near->cell + 1]; k++)
+    if (m->cell_vertex[k] == v[0] || m->cell_vertex[k] == v[1] || m->cell_vertex[k] == v[2]) return 0;
+  return 1;
+}
+
+/* True if every triangle of the cell is seen from inside from the mean of its vertices, clearly: the cell is then star-shaped,
+ * hence winds once about its inside and not at all about the rest. Rounding can only make the answer false. */
+static bool is_star_shaped(const rm_trimesh *m, rm_lid c)
+{
+  double        o[3] = {0, 0, 0}, size = 0;
+  const rm_lid  first = m->cell_vertex_offset[c], last = m->cell_vertex_offset[c + 1];
+  const double *box = m->cell_box[c];
+
+  for (rm_lid k = first; k < last; k++)
+    for (int a = 0; a < 3; a++) o[a] += m->vertex[m->cell_vertex[k]][a] - box[a];
+  for (int a = 0; a < 3; a++) {
+    o[a] = box[a] + o[a] / (last - first);
+    size = box[a + 3] - box[a] > size ? box[a + 3] - box[a] : size;
+  }
+  for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++) {
+    const double *v = m->vertex[m->triangle[m->cell_triangle[a] / 2][0]], *n = m->normal[m->cell_triangle[a] / 2];
+    const double  h = n[0] * (v[0] - o[0]) + n[1] * (v[1] - o[1]) + n[2] * (v[2] - o[2]);
+    const double  noise = 0x1p-46 * size * size * size;
+    if ((m->cell_triangle[a] & 1 ? -h : h) <= noise) return false;
+  }
+  return first < last;
+}
+
+static int any(void *user, rm_lid item)
+{
+  (void)user, (void)item;
+  return 1;
+}
+
+static remap_status forbid_adjacency(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+{
+  uint8_t *by_tree, *pinched;
+  double (*odd_box)[6];
+  rm_lid   num_odd = 0;
+  const rm_boxtree *odd_tree;
+
+  RM_NEW0(by_tree, arena, m->num_cells);
+  RM_NEW0(pinched, scratch, m->num_vertices);
+  RM_NEW(odd_box, scratch, m->num_cells);
+  RM_TRY(pinched_vertices(scratch, m, pinched));
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    nearness near = {m, c};
+
+    if (m->cell_edge_offset[c] == m->cell_edge_offset[c + 1]) by_tree[c] = 1;
+    for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++) by_tree[c] |= pinched[m->cell_vertex[k]];
+    if (!by_tree[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) by_tree[c] = 1;
+    if (m->cell_edge_offset[c] == m->cell_edge_offset[c + 1] ? m->num_cells > 1 : !is_star_shaped(m, c)) {
+      by_tree[c] = 1;
+      memcpy(odd_box[num_odd++], m->cell_box[c], sizeof *odd_box);
+    }
+  }
+  if (num_odd) {
+    RM_TRY(rm_boxtree_build(scratch, num_odd, (const double (*)[6])odd_box, &odd_tree));
+    for (rm_lid c = 0; c < m->num_cells; c++)
+      if (!by_tree[c] && rm_boxtree_query(odd_tree, (const double (*)[6])odd_box, m->cell_box[c], any, NULL)) by_tree[c] = 1;
+  }
+  m->cell_by_tree = by_tree;
+  return REMAP_OK;
+}
+
+/* ------------------------------------------------------------------------------------------------------------------ */
+
+static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_trimesh *m)
+{
+  rm_lid        *vertex_of;
+  corner_triple *triple;
+  int64_t        num_triples;
+  double       (*normal)[3];
+
+  RM_TRY(triangulate_faces(b, faces));
+  RM_NEW(vertex_of, b->scratch, b->num_points);
+  RM_TRY(number_vertices(arena, b, vertex_of, m));
+  RM_TRY(collect_triples(b, vertex_of, m->num_vertices, &triple, &num_triples));
+  RM_TRY(join_triangles(arena, triple, num_triples, m));
+  RM_NEW(normal, arena, m->num_triangles);
+  for (rm_lid t = 0; t < m->num_triangles; t++) triangle_normal(m, t, normal[t]);
+  m->normal = (const double (*)[3])normal;
+  RM_TRY(number_edges(arena, b->scratch, m));
+  RM_TRY(edges_at_vertices(arena, m));
+  RM_TRY(triangles_of_cells(arena, m));
+  RM_TRY(edges_of_cells(arena, b->scratch, m));
+  RM_TRY(boxes(arena, m));
+  RM_TRY(collect_skin(arena, m));
+  return forbid_adjacency(arena, b->scratch, m);
+}
+
+remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
+                              const rm_trimesh **out)
+{
+  builder      b = {.scratch = rm_arena_new(), .frame = frame, .piece = piece};
+  rm_trimesh  *m = rm_arena_zero(arena, 1, sizeof *m);
+  remap_status status = b.scratch && m ? REMAP_OK : REMAP_NO_MEMORY;
+
+  if (status == REMAP_OK) {
+    m->num_cells = piece->num_cells;
+    status       = build(arena, &b, faces, m);
+  }
+  rm_arena_drop(b.scratch);
+  if (status == REMAP_OK) *out = m;
+  return status;
+}
