@@ -1,0 +1,683 @@
+/* sids_mesh -- this rank's part of the mesh.
+ *
+ * Blocks: the nodes of the rank's layers are read as slabs and faces follow from indices alone. Elements: the rank's rows are
+ * read, the coordinates of their nodes come from the ranks that read them as slabs, and faces join by node numbers through a
+ * hash. O(cells) time and memory, and one exchange for each unstructured zone. Cells of different ranks or zones are not
+ * joined here. A zone whose volume is negative is mirrored as a whole: its faces are turned round. */
+#include "cgns_private.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_FACES = 6, MAX_CORNERS = 8 };
+
+/* Faces of the standard elements, outward, corners from 0; -1 pads triangles. */
+static const int8_t TETRA[][4] = {{0, 2, 1, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {2, 0, 3, -1}};
+static const int8_t PYRA[][4]  = {{0, 3, 2, 1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}};
+static const int8_t PENTA[][4] = {{0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}, {0, 2, 1, -1}, {3, 4, 5, -1}};
+static const int8_t HEXA[][4]  = {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {0, 4, 7, 3}, {4, 5, 6, 7}};
+
+static const struct {
+  int            num;
+  const int8_t (*face)[4];
+} ELEMENT[] = {
+  [RC_NONE] = {0, NULL}, [RC_TETRA] = {4, TETRA}, [RC_PYRA] = {5, PYRA}, [RC_PENTA] = {5, PENTA}, [RC_HEXA] = {6, HEXA}};
+
+bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour)
+{
+  int64_t *loop;
+
+  if (!rc_reserve(&mesh->face_node, n, sizeof *loop)) return false;
+  loop = (int64_t *)mesh->face_node.item + mesh->face_node.count;
+  for (int64_t i = 0; i < n; i++) loop[i] = node[reverse ? n - 1 - i : i];
+  mesh->face_node.count += n;
+  return rc_push(&mesh->face_offset, mesh->face_node.count) && rc_push(&mesh->face_owner, owner) &&
+         rc_push(&mesh->face_neighbour, neighbour);
+}
+
+double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin)
+{
+  double mean[3] = {0, 0, 0}, sum = 0.0;
+
+  for (int64_t i = 0; i < n; i++)
+    for (int d = 0; d < 3; d++) mean[d] += (xyz[3 * node[i] + d] - origin[d]) / (double)n;
+  for (int64_t i = 0; i < n; i++) {
+    const double *a = xyz + 3 * node[i], *b = xyz + 3 * node[i + 1 < n ? i + 1 : 0];
+    double        p[3], q[3];
+
+    for (int d = 0; d < 3; d++) p[d] = a[d] - origin[d], q[d] = b[d] - origin[d];
+    sum += mean[0] * (p[1] * q[2] - p[2] * q[1]) + mean[1] * (p[2] * q[0] - p[0] * q[2]) + mean[2] * (p[0] * q[1] - p[1] * q[0]);
+  }
+  return sum;
+}
+
+/* The caller's scale and transform; false: not finite. */
+static bool place(const rcgns_file *file, const double x[3], double *out)
+{
+  bool finite = true;
+
+  for (int r = 0; r < 3; r++) {
+    const double *row = file->map[r];
+
+    out[r] = row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3];
+    finite = finite && isfinite(out[r]);
+  }
+  return finite;
+}
+
+/* Coordinates as they are stored are handed on bit by bit where neither scale nor transform was asked for. */
+static bool is_identity(const rcgns_file *file)
+{
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 4; c++)
+      if (file->map[r][c] != (r == c ? 1.0 : 0.0)) return false;
+  return true;
+}
+
+/* Interleave, place and check n nodes; number[i], or first + i where it is NULL, is for the message. */
+static rcgns_status place_all(const rcgns_file *file, const rc_zone *zone, int64_t n, const double *x, const double *y,
+                              const double *z, int64_t first, double *xyz, rcgns_message *message)
+{
+  const bool same = is_identity(file);
+
+  for (int64_t i = 0; i < n; i++) {
+    const double at[3] = {x[i], y[i], z[i]};
+    bool         ok    = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2]);
+
+    if (same)
+      memcpy(xyz + 3 * i, at, sizeof at);
+    else
+      ok = place(file, at, xyz + 3 * i) && ok;
+    if (!ok)
+      return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: node %lld has a coordinate that is not a finite number: repair the mesh",
+                     file->path, zone->name, (long long)(first + i + 1));
+  }
+  return RCGNS_OK;
+}
+
+/* ---- blocks ------------------------------------------------------------------------------------------------------- */
+
+/* The nodes of a rank's part of a block: rows j0 .. j0 + rows - 1 of the planes k0 .. k0 + planes - 1, i fastest. */
+typedef struct patch {
+  int64_t j0, rows, k0, planes, count;
+} patch;
+
+static patch patch_of(const rc_zone *zone, int64_t lo, int64_t hi)
+{
+  const int64_t ci = zone->cells[0], layer = ci * zone->cells[1];
+  const int64_t k0 = lo / layer, k1 = (hi - 1) / layer;
+  patch         p = {0, 0, 0, 0, 0};
+
+  if (lo >= hi) return p;
+  p        = (patch){.rows = zone->vertices[1], .k0 = k0, .planes = k1 - k0 + 2};
+  if (k0 == k1) {
+    p.j0   = lo % layer / ci;
+    p.rows = (hi - 1) % layer / ci - p.j0 + 2;
+  }
+  p.count = p.planes * p.rows * zone->vertices[0];
+  return p;
+}
+
+/* One coordinate of the patch: a slab of planes or, within one layer, of rows in two planes. Collective. */
+static rcgns_status read_patch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const patch *p, int64_t node, double *out,
+                               rcgns_message *message)
+{
+  const int64_t ni = zone->vertices[0], nj = zone->vertices[1];
+  const rc_box  box = {.nd     = 3,
+                       .origin = {zone->rind[4], zone->rind[2], zone->rind[0]},
+                       .shape  = {zone->vertices[2], nj, ni}};
+  const int64_t from  = (p->k0 * nj + p->j0) * ni;
+  const int64_t first = p->rows < nj ? p->rows * ni : p->count; /* values of the first slab */
+  const int64_t rest  = p->count - first;
+
+  RC_TRY(rc_read(file, mine, node, &box, from, from + first, 'R', out, message));
+  return rc_read(file, RCGNS_OK, node, &box, from + nj * ni, from + nj * ni + rest, 'R', out ? out + first : NULL, message);
+}
+
+static rcgns_status patch_nodes(rcgns_file *file, const rc_zone *zone, const patch *p, rcgns_message *message)
+{
+  rc_array    *xyz    = &file->build.xyz;
+  double      *x      = rc_alloc(3 * p->count, sizeof *x);
+  rcgns_status status = x && rc_reserve(xyz, p->count, 3 * sizeof *x) ? RCGNS_OK : rc_no_memory(message);
+
+  for (int d = 0; d < 3; d++) {
+    double *at = x ? x + d * p->count : NULL;
+
+    RC_GOTO(done, status = read_patch(file, status, zone, p, zone->coordinate[d], at, message));
+  }
+  status = place_all(file, zone, p->count, x, x + p->count, x + 2 * p->count, (p->k0 * zone->vertices[1] + p->j0) * zone->vertices[0],
+                     (double *)xyz->item + 3 * xyz->count, message);
+  xyz->count += p->count;
+  status = rc_agree(file->comm, status, message);
+done:
+  free(x);
+  return status;
+}
+
+/* Faces of the cells [lo, hi): those towards larger indices of every cell, and the others where no cell of ours is beyond. */
+static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int64_t base, int64_t lo, int64_t hi, int64_t first_cell)
+{
+  static const int8_t corner[MAX_CORNERS][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+  static const int8_t axis[MAX_FACES] = {2, 1, 0, 1, 0, 2}, step[MAX_FACES] = {-1, -1, 1, 1, -1, 1}; /* of the faces of HEXA */
+  const int64_t *const n = zone->cells;
+  const int64_t stride[3] = {1, n[0], n[0] * n[1]};
+
+  for (int64_t c = lo; c < hi; c++) {
+    const int64_t at[3] = {c % n[0], c / n[0] % n[1], c / stride[2]};
+
+    for (int f = 0; f < MAX_FACES; f++) {
+      const int     a     = axis[f];
+      const int64_t index = at[a] + step[f];
+      int64_t       other = index < 0 || index >= n[a] ? -1 : c + step[f] * stride[a];
+      int64_t       loop[4];
+
+      if (other < lo || other >= hi) other = -1;
+      if (other >= 0 && step[f] < 0) continue;
+      for (int v = 0; v < 4; v++) {
+        const int8_t *d = corner[HEXA[f][v]];
+
+        loop[v] = base + ((at[2] + d[2] - p->k0) * p->rows + at[1] + d[1] - p->j0) * zone->vertices[0] + at[0] + d[0];
+      }
+      if (!rc_face_add(mesh, loop, 4, false, first_cell + c - lo, other < 0 ? -1 : first_cell + other - lo)) return false;
+    }
+  }
+  return true;
+}
+
+static rcgns_status build_block(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell, rcgns_message *message)
+{
+  const patch   p    = patch_of(zone, lo, hi);
+  const int64_t base = file->build.xyz.count;
+
+  RC_TRY(patch_nodes(file, zone, &p, message));
+  return rc_agree(file->comm, block_faces(&file->build, zone, &p, base, lo, hi, first_cell) ? RCGNS_OK : rc_no_memory(message), message);
+}
+
+/* ---- nodes of elements -------------------------------------------------------------------------------------------- */
+
+typedef struct located {
+  double  xyz[3];
+  int64_t shared;
+} located;
+
+/* The rank's slab of the coordinates, [n][3]. Collective. */
+static rcgns_status read_slab(rcgns_file *file, rcgns_status mine, const rc_zone *zone, int64_t lo, int64_t hi, double *x,
+                              rcgns_message *message)
+{
+  const rc_box box = {.nd = 1, .origin = {zone->rind[0]}, .shape = {zone->num_nodes}};
+
+  for (int d = 0; d < 3; d++) {
+    RC_TRY(rc_read(file, mine, zone->coordinate[d], &box, lo, hi, 'R', x ? x + d * (hi - lo) : NULL, message));
+    mine = RCGNS_OK;
+  }
+  return RCGNS_OK;
+}
+
+/* Answer the requests: which nodes, from how many each. */
+static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t n, const double *x, const int64_t *asked,
+                           int64_t num_asked, located *reply, rcgns_message *message)
+{
+  uint8_t     *times  = calloc((size_t)n + 1, 1);
+  rcgns_status status = times ? RCGNS_OK : rc_no_memory(message);
+
+  for (int64_t i = 0; i < num_asked && times; i++)
+    if (times[asked[i] - lo] < 2) times[asked[i] - lo]++;
+  for (int64_t i = 0; i < num_asked && status == RCGNS_OK; i++) {
+    const int64_t at = asked[i] - lo;
+
+    status          = place_all(file, zone, 1, x + at, x + n + at, x + 2 * n + at, asked[i], reply[i].xyz, message);
+    reply[i].shared = times[at] > 1;
+  }
+  free(times);
+  return status;
+}
+
+rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n, double *xyz,
+                            uint8_t *shared, rcgns_message *message)
+{
+  const int64_t total = zone->num_nodes;
+  const int64_t lo = rc_share(total, file->rank, file->size), hi = rc_share(total, file->rank + 1, file->size);
+  int64_t      *count = calloc(3 * (size_t)file->size, sizeof *count), *next = count ? count + file->size : NULL;
+  int64_t      *sorted = rc_alloc(n, sizeof *sorted), *place_of = rc_alloc(n, sizeof *place_of), *recv = count ? count + 2 * file->size : NULL;
+  double       *x     = rc_alloc(3 * (hi - lo), sizeof *x);
+  void         *asked = NULL, *back = NULL;
+  located      *reply = NULL;
+  int64_t       num_asked = 0;
+  rcgns_status  status = mine;
+
+  if (status == RCGNS_OK && !(count && sorted && place_of && x)) status = rc_no_memory(message);
+  for (int64_t i = 0; i < n && status == RCGNS_OK; i++) count[rc_owner(total, node[i], file->size)]++;
+  for (int r = 1; r < file->size && status == RCGNS_OK; r++) next[r] = next[r - 1] + count[r - 1];
+  for (int64_t i = 0; i < n && status == RCGNS_OK; i++) {
+    place_of[i]         = next[rc_owner(total, node[i], file->size)]++;
+    sorted[place_of[i]] = node[i];
+  }
+  RC_GOTO(done, status = rc_exchange(file->comm, status, sorted, count, sizeof *sorted, &asked, recv, message));
+  RC_GOTO(done, status = read_slab(file, RCGNS_OK, zone, lo, hi, x, message));
+  for (int r = 0; r < file->size; r++) num_asked += recv[r];
+  reply  = rc_alloc(num_asked, sizeof *reply);
+  status = reply ? answer(file, zone, lo, hi - lo, x, asked, num_asked, reply, message) : rc_no_memory(message);
+  RC_GOTO(done, status = rc_exchange(file->comm, status, reply, recv, sizeof *reply, &back, count, message));
+  for (int64_t i = 0; i < n; i++) {
+    const located *l = (const located *)back + place_of[i];
+
+    memcpy(xyz + 3 * i, l->xyz, sizeof l->xyz);
+    if (shared) shared[i] = l->shared != 0;
+  }
+done:
+  free(count);
+  free(sorted);
+  free(place_of);
+  free(x);
+  free(asked);
+  free(back);
+  free(reply);
+  return status;
+}
+
+/* ---- elements ----------------------------------------------------------------------------------------------------- */
+
+/* The standard elements of this rank in one zone. */
+typedef struct elements {
+  rc_array cell;    /* int64_t: number in the zone */
+  rc_array shape;   /* int64_t: rc_shape */
+  rc_array corner;  /* int64_t [count][MAX_CORNERS] node in the zone, later in this rank's mesh; the rest is -1 */
+  rc_map   node;    /* node in the zone -> in the order they come */
+  uint8_t *shared;  /* [nodes] other ranks have it too */
+  int64_t  base;    /* index in this rank's mesh of its first node */
+} elements;
+
+static void drop_elements(elements *e)
+{
+  rc_drop(&e->cell);
+  rc_drop(&e->shape);
+  rc_drop(&e->corner);
+  rc_map_drop(&e->node);
+  free(e->shared);
+}
+
+static rcgns_status add_element(const rcgns_file *file, const rc_zone *zone, elements *e, int64_t cell, rc_shape shape,
+                                const int64_t *node, rcgns_message *message)
+{
+  int64_t corner[MAX_CORNERS];
+
+  for (int i = 0; i < MAX_CORNERS; i++) {
+    corner[i] = i < rc_corners(shape) ? node[i] - 1 : -1;
+    if (i < rc_corners(shape) && (node[i] < 1 || node[i] > zone->num_nodes))
+      return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: cell %lld refers to node %lld, but there are %lld: the mesh is damaged",
+                     file->path, zone->name, (long long)cell + 1, (long long)node[i], (long long)zone->num_nodes);
+  }
+  if (!rc_push(&e->cell, cell) || !rc_push(&e->shape, (int64_t)shape) || !rc_reserve(&e->corner, 1, sizeof corner)) return rc_no_memory(message);
+  memcpy((int64_t *)e->corner.item + MAX_CORNERS * e->corner.count++, corner, sizeof corner);
+  return RCGNS_OK;
+}
+
+/* Cells [lo, hi) of a section of one type. Collective. */
+static rcgns_status read_fixed(rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t lo, int64_t hi, elements *e,
+                               rcgns_message *message)
+{
+  int64_t     *node   = rc_alloc((hi - lo) * s->npe, sizeof *node);
+  rcgns_status status = node ? RCGNS_OK : rc_no_memory(message);
+
+  status = rc_read_1d(file, status, s->connectivity, (s->row_lo + lo) * s->npe, (s->row_lo + hi) * s->npe, 'I', node, message);
+  for (int64_t i = 0; i < hi - lo && status == RCGNS_OK; i++)
+    status = add_element(file, zone, e, s->first_cell + lo + i, s->shape, node + i * s->npe, message);
+  free(node);
+  return rc_agree(file->comm, status, message);
+}
+
+/* Cells [lo, hi) of a MIXED section, which lie in the rows between two cuts. Collective. */
+static rcgns_status read_mixed(rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t lo, int64_t hi, elements *e,
+                               rcgns_message *message)
+{
+  rc_array     offset = {.item = NULL}, data = {.item = NULL};
+  int64_t      a = 0, b = 0, cell = 0, row_lo, row_hi;
+  rcgns_status status;
+
+  if (lo < hi) {
+    while (a + 1 < s->num_cuts && s->cut_cell[a + 1] <= lo) a++;
+    for (b = a; s->cut_cell[b] < hi;) b++;
+    cell = s->cut_cell[a];
+  }
+  row_lo = a * RC_CUT;
+  row_hi = b * RC_CUT < s->num_rows ? b * RC_CUT : s->num_rows;
+  status = rc_rows_read(file, zone, s, row_lo, lo < hi ? row_hi : row_lo, &offset, &data, message);
+  for (int64_t r = row_lo; r < row_hi && lo < hi && status == RCGNS_OK; r++) {
+    const int64_t *row = (const int64_t *)data.item + ((const int64_t *)offset.item)[r - row_lo];
+    rc_shape       shape;
+
+    rc_element(file->version, row[0], &shape);
+    if (shape == RC_NONE || r < s->row_lo || r >= s->row_hi) continue;
+    if (cell >= lo && cell < hi) status = add_element(file, zone, e, s->first_cell + cell, shape, row + 1, message);
+    cell++;
+  }
+  rc_drop(&offset);
+  rc_drop(&data);
+  return rc_agree(file->comm, status, message);
+}
+
+/* Number the nodes, fetch their coordinates. Collective. */
+static rcgns_status locate(rcgns_file *file, const rc_zone *zone, elements *e, rcgns_message *message)
+{
+  rc_array    *xyz    = &file->build.xyz;
+  int64_t     *corner = e->corner.item;
+  rcgns_status status = RCGNS_OK;
+  int64_t      n;
+
+  e->base       = xyz->count;
+  e->node.width = 1;
+  for (int64_t i = 0; i < MAX_CORNERS * e->corner.count && status == RCGNS_OK; i++) {
+    if (corner[i] < 0) continue;
+    corner[i] = rc_map_add(&e->node, &corner[i]);
+    if (corner[i] < 0) status = rc_no_memory(message);
+  }
+  n         = e->node.key.count;
+  e->shared = rc_alloc(n, 1);
+  if (status == RCGNS_OK && !(e->shared && rc_reserve(xyz, n, 3 * sizeof(double)))) status = rc_no_memory(message);
+  RC_TRY(rc_nodes_fetch(file, status, zone, e->node.key.item, n, (double *)xyz->item + 3 * xyz->count, e->shared, message));
+  xyz->count += n;
+  return RCGNS_OK;
+}
+
+/* Face f of element i: its loop without repetitions of neighbours, its sorted nodes. Returns the number of distinct nodes. */
+static int side_of(const elements *e, int64_t i, int f, int64_t *loop, int *length, int64_t key[4])
+{
+  const int64_t *corner = (const int64_t *)e->corner.item + MAX_CORNERS * i;
+  const int8_t  *face   = ELEMENT[((const int64_t *)e->shape.item)[i]].face[f];
+  int            distinct = 0, n = 0;
+
+  for (int v = 0; v < 4 && face[v] >= 0; v++) {
+    const int64_t node = corner[face[v]];
+    int           k    = 0;
+
+    if (!n || loop[n - 1] != node) loop[n++] = node;
+    while (k < distinct && key[k] != node) k++;
+    if (k < distinct) continue;
+    for (k = distinct++; k > 0 && key[k - 1] > node; k--) key[k] = key[k - 1];
+    key[k] = node;
+  }
+  while (n > 1 && loop[n - 1] == loop[0]) n--;
+  for (int k = distinct; k < 4; k++) key[k] = -1;
+  *length = n;
+  return distinct;
+}
+
+/* Do two loops over the same nodes run against each other? */
+static bool is_opposite(const int64_t *a, int n, const int64_t *b, int m)
+{
+  int at = 0;
+
+  if (n != m) return false;
+  while (at < m && b[at] != a[0]) at++;
+  if (at == m) return false;
+  for (int i = 0; i < n; i++)
+    if (a[i] != b[(at + m - i) % m]) return false;
+  return true;
+}
+
+/* Faces that join by their nodes. For each set of nodes: up to two sides, MAX_FACES * element + face. */
+typedef struct joints {
+  rc_map   set;
+  rc_array side; /* int64_t [sets][2], -1: none */
+  rc_array alone; /* int64_t: sides that fold back on their own cell */
+} joints;
+
+static rcgns_status join_side(const rcgns_file *file, const rc_zone *zone, const elements *e, joints *j, int64_t side, const int64_t key[4],
+                              rcgns_message *message)
+{
+  const int64_t *cell = e->cell.item;
+  const int64_t  set  = rc_map_add(&j->set, key);
+  int64_t       *both;
+
+  if (set < 0) return rc_no_memory(message);
+  if (set == j->side.count / 2 && !(rc_push(&j->side, -1) && rc_push(&j->side, -1))) return rc_no_memory(message);
+  both = (int64_t *)j->side.item + 2 * set;
+  if (both[0] >= 0 && both[1] >= 0)
+    return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: the cells %lld, %lld and %lld share one face: at most two can: repair the mesh",
+                   file->path, zone->name, (long long)cell[both[0] / MAX_FACES] + 1, (long long)cell[both[1] / MAX_FACES] + 1,
+                   (long long)cell[side / MAX_FACES] + 1);
+  both[both[0] >= 0] = side;
+  return RCGNS_OK;
+}
+
+/* All sides of all elements. A flat cell's two equal faces join nothing: its neighbours see each other through it. */
+static rcgns_status join(const rcgns_file *file, const rc_zone *zone, const elements *e, joints *j, rcgns_message *message)
+{
+  j->set.width = 4;
+  for (int64_t i = 0; i < e->cell.count; i++) {
+    const int num = ELEMENT[((const int64_t *)e->shape.item)[i]].num;
+    int64_t   key[MAX_FACES][4], loop[4];
+    int       distinct[MAX_FACES], length;
+
+    for (int f = 0; f < num; f++) distinct[f] = side_of(e, i, f, loop, &length, key[f]);
+    for (int f = 0; f < num; f++) {
+      bool folded = false;
+
+      if (distinct[f] < 3) continue;
+      for (int g = 0; g < num; g++) folded = folded || (g != f && !memcmp(key[f], key[g], sizeof key[f]));
+      if (!folded)
+        RC_TRY(join_side(file, zone, e, j, MAX_FACES * i + f, key[f], message));
+      else if (!rc_push(&j->alone, MAX_FACES * i + f))
+        return rc_no_memory(message);
+    }
+  }
+  return RCGNS_OK;
+}
+
+/* A side, or two that join, into the mesh. */
+static bool emit(rc_mesh *mesh, const elements *e, int64_t first_cell, int64_t lo, int64_t side, int64_t other)
+{
+  const int64_t *cell = e->cell.item;
+  int64_t        loop[4], key[4], against[4];
+  int            n, m = 0;
+
+  side_of(e, side / MAX_FACES, (int)(side % MAX_FACES), loop, &n, key);
+  if (other >= 0) side_of(e, other / MAX_FACES, (int)(other % MAX_FACES), against, &m, key);
+  if (other >= 0 && !is_opposite(loop, n, against, m))
+    return emit(mesh, e, first_cell, lo, side, -1) && emit(mesh, e, first_cell, lo, other, -1);
+  for (int i = 0; i < n; i++) loop[i] += e->base;
+  return rc_face_add(mesh, loop, n, false, first_cell + cell[side / MAX_FACES] - lo,
+                     other < 0 ? -1 : first_cell + cell[other / MAX_FACES] - lo);
+}
+
+typedef struct claim {
+  int64_t key[4], cell, sides;
+} claim;
+
+static int by_key(const void *a, const void *b)
+{
+  const claim *x = a, *y = b;
+
+  for (int k = 0; k < 4; k++)
+    if (x->key[k] != y->key[k]) return x->key[k] < y->key[k] ? -1 : 1;
+  return (x->cell > y->cell) - (x->cell < y->cell);
+}
+
+/* A set of nodes that other ranks may have as a face too, in the zone's numbers; false: they cannot. */
+static bool claim_of(const elements *e, const joints *j, int64_t set, claim *c)
+{
+  const int64_t *key = (const int64_t *)j->set.key.item + 4 * set, *both = (const int64_t *)j->side.item + 2 * set;
+  const int64_t *node = e->node.key.item;
+
+  *c = (claim){.key = {-1, -1, -1, -1}, .cell = ((const int64_t *)e->cell.item)[both[0] / MAX_FACES], .sides = both[1] < 0 ? 1 : 2};
+  for (int k = 0; k < 4 && key[k] >= 0; k++) {
+    int at = k;
+
+    if (!e->shared[key[k]]) return false;
+    for (; at > 0 && c->key[at - 1] > node[key[k]]; at--) c->key[at] = c->key[at - 1];
+    c->key[at] = node[key[k]];
+  }
+  return true;
+}
+
+/* No face may belong to three cells, wherever they are. Collective; only faces between ranks travel. */
+static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const elements *e, const joints *j, rcgns_message *message)
+{
+  const int64_t sets   = j->set.key.count;
+  int64_t      *count  = calloc(3 * (size_t)file->size, sizeof *count);
+  rcgns_status  status = count ? RCGNS_OK : rc_no_memory(message);
+  claim        *send = NULL, one;
+  void         *got  = NULL;
+  int64_t       total = 0, num = 0;
+
+  if (status != RCGNS_OK) count = NULL;
+  for (int64_t s = 0; s < sets && count; s++)
+    if (claim_of(e, j, s, &one)) count[one.key[0] % file->size]++, num++;
+  if (!(send = rc_alloc(num, sizeof *send))) status = rc_no_memory(message);
+  for (int r = 1; r < file->size && count; r++) count[file->size + r] = count[file->size + r - 1] + count[r - 1];
+  for (int64_t s = 0; s < sets && status == RCGNS_OK; s++)
+    if (claim_of(e, j, s, &one)) send[count[file->size + one.key[0] % file->size]++] = one;
+  RC_GOTO(done, status = rc_exchange(file->comm, status, send, count, sizeof *send, &got, count ? count + 2 * file->size : NULL, message));
+  for (int r = 0; r < file->size; r++) total += count[2 * file->size + r];
+  qsort(got, (size_t)total, sizeof *send, by_key);
+  for (int64_t i = 0, first = 0, sides = 0; i < total && status == RCGNS_OK; i++) {
+    const claim *c = (const claim *)got + i;
+
+    if (memcmp(c->key, ((const claim *)got)[first].key, sizeof c->key)) first = i, sides = 0;
+    sides += c->sides;
+    if (sides > 2)
+      status = rc_fail(message, RCGNS_GEOMETRY,
+                       "%s: zone %s: more than two cells, %lld and %lld among them, share the face with the nodes %lld %lld %lld: "
+                       "repair the mesh", file->path, zone->name, (long long)((const claim *)got)[first].cell + 1, (long long)c->cell + 1,
+                       (long long)c->key[0] + 1, (long long)c->key[1] + 1, (long long)c->key[2] + 1);
+  }
+  status = rc_agree(file->comm, status, message);
+done:
+  free(count);
+  free(send);
+  free(got);
+  return status;
+}
+
+static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elements *e, int64_t lo, int64_t first_cell, rcgns_message *message)
+{
+  joints       j      = {.alone = {.item = NULL}};
+  rcgns_status status = locate(file, zone, e, message);
+
+  if (status == RCGNS_OK) {
+    status = rc_agree(file->comm, join(file, zone, e, &j, message), message);
+    if (status == RCGNS_OK) status = check_shared(file, zone, e, &j, message);
+    if (status == RCGNS_OK) {
+      const int64_t *side = j.side.item, *alone = j.alone.item;
+      bool           ok   = true;
+
+      for (int64_t s = 0; s < j.set.key.count && ok; s++) ok = emit(&file->build, e, first_cell, lo, side[2 * s], side[2 * s + 1]);
+      for (int64_t s = 0; s < j.alone.count && ok; s++) ok = emit(&file->build, e, first_cell, lo, alone[s], -1);
+      status = rc_agree(file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
+    }
+  }
+  rc_map_drop(&j.set);
+  rc_drop(&j.side);
+  rc_drop(&j.alone);
+  return status;
+}
+
+static int64_t clamp(int64_t value, int64_t lo, int64_t hi)
+{
+  return value < lo ? lo : value > hi ? hi : value;
+}
+
+/* Cells [lo, hi) of an unstructured zone. Collective. */
+static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell, rcgns_message *message)
+{
+  elements     e      = {.base = 0};
+  bool         any    = false;
+  rcgns_status status = RCGNS_OK;
+
+  if (zone->by_parents) return rc_poly_build(file, zone, NULL, lo, hi, first_cell, message);
+  for (int64_t i = 0; i < zone->num_sections && status == RCGNS_OK; i++) {
+    const rc_section *s = zone->section + i;
+    const int64_t     a = clamp(lo - s->first_cell, 0, s->num_cells), b = clamp(hi - s->first_cell, a, s->num_cells);
+
+    if (s->is_poly) continue;
+    any    = true;
+    status = s->layout == RC_MIXED ? read_mixed(file, zone, s, a, b, &e, message) : read_fixed(file, zone, s, a, b, &e, message);
+  }
+  if (status == RCGNS_OK && any) status = build_elements(file, zone, &e, lo, first_cell, message);
+  drop_elements(&e);
+  for (int64_t i = 0; i < zone->num_sections && status == RCGNS_OK; i++) {
+    const rc_section *s = zone->section + i;
+    const int64_t     a = clamp(lo, s->first_cell, s->first_cell + s->num_cells), b = clamp(hi, a, s->first_cell + s->num_cells);
+
+    if (s->is_poly) status = rc_poly_build(file, zone, s, a, b, first_cell + a - lo, message);
+  }
+  return status;
+}
+
+/* ---- the whole ---------------------------------------------------------------------------------------------------- */
+
+/* Turn the faces of zones round whose volume is negative; first_face [zones + 1] says which faces are whose. Collective. */
+static rcgns_status orient_zones(rcgns_file *file, const int64_t *first_face, rcgns_message *message)
+{
+  const rc_mesh *mesh   = &file->build;
+  const int64_t *offset = mesh->face_offset.item, *neighbour = mesh->face_neighbour.item;
+  int64_t       *node   = mesh->face_node.item;
+  const double  *xyz    = mesh->xyz.item;
+  double        *volume = calloc((size_t)file->num_zones, sizeof *volume);
+
+  RC_TRY(rc_agree(file->comm, volume ? RCGNS_OK : rc_no_memory(message), message));
+  for (int64_t z = 0; z < file->num_zones; z++)
+    for (int64_t f = first_face[z]; f < first_face[z + 1]; f++)
+      if (neighbour[f] < 0)
+        volume[z] += rc_cone(xyz, node + offset[f], offset[f + 1] - offset[f], xyz + 3 * node[offset[first_face[z]]]);
+  for (int64_t z = 0; z < file->num_zones; z += 1 << 20)
+    MPI_Allreduce(MPI_IN_PLACE, volume + z, (int)(file->num_zones - z < 1 << 20 ? file->num_zones - z : 1 << 20), MPI_DOUBLE, MPI_SUM,
+                  file->comm);
+  for (int64_t z = 0; z < file->num_zones; z++)
+    for (int64_t f = first_face[z]; f < first_face[z + 1] && volume[z] < 0.0; f++)
+      for (int64_t a = offset[f], b = offset[f + 1] - 1; a < b; a++, b--) {
+        const int64_t keep = node[a];
+
+        node[a] = node[b];
+        node[b] = keep;
+      }
+  free(volume);
+  return RCGNS_OK;
+}
+
+static rcgns_status build_zone(rcgns_file *file, int64_t z, rcgns_message *message)
+{
+  const rc_zone *zone  = file->zone + z;
+  rc_array      *cells = &file->build.cell_global;
+  const int64_t  first = cells->count;
+  const int64_t  lo = clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells), hi = clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
+  rcgns_status   status = RCGNS_OK;
+
+  for (int64_t c = lo; c < hi && status == RCGNS_OK; c++)
+    if (!rc_push(cells, zone->first_cell + c)) status = rc_no_memory(message);
+  RC_TRY(rc_agree(file->comm, status, message));
+  return zone->is_structured ? build_block(file, zone, lo, hi, first, message) : build_sections(file, zone, lo, hi, first, message);
+}
+
+rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message)
+{
+  rc_mesh     *build      = &file->build;
+  int64_t     *first_face = rc_alloc(file->num_zones + 1, sizeof *first_face);
+  rcgns_status status     = first_face && rc_push(&build->face_offset, 0) ? RCGNS_OK : rc_no_memory(message);
+
+  status = rc_agree(file->comm, status, message);
+  for (int64_t z = 0; z < file->num_zones && status == RCGNS_OK; z++) {
+    first_face[z] = build->face_owner.count;
+    status        = build_zone(file, z, message);
+  }
+  if (status == RCGNS_OK) {
+    first_face[file->num_zones] = build->face_owner.count;
+    status                      = orient_zones(file, first_face, message);
+  }
+  free(first_face);
+  file->mesh = (remap_mesh){.num_nodes        = build->xyz.count,
+                            .num_faces        = build->face_owner.count,
+                            .num_cells        = build->cell_global.count,
+                            .node_xyz         = build->xyz.item,
+                            .face_offset      = build->face_offset.item,
+                            .face_node        = build->face_node.item,
+                            .face_owner       = build->face_owner.item,
+                            .face_neighbour   = build->face_neighbour.item,
+                            .cell_global      = build->cell_global.item,
+                            .name             = file->path,
+                            .num_zones        = file->num_zones,
+                            .zone_name        = file->zone_name,
+                            .zone_cell_offset = file->zone_cell_offset};
+  return status;
+}
