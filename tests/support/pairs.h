@@ -2,7 +2,7 @@
  * of neighbourhood, each handed in in several ways.
  *
  *   pairs_world world;
- *   pairs_open(&world, PAIRS_SAME, PAIRS_RANDOM);
+ *   pairs_open(&world, PAIRS_SAME, TM_RANDOM);
  *   ... rm_zone_build(world.arena, &world.comm, world.mesh, &zone) ...
  *   pairs_close(&world);
  *
@@ -26,12 +26,7 @@ typedef enum pairs_kind {
   PAIRS_NUM_KINDS
 } pairs_kind;
 
-typedef enum pairs_deal {
-  PAIRS_BLOCKS, /* cells in their order, evenly       */
-  PAIRS_ONE,    /* all on the last rank               */
-  PAIRS_RANDOM, /* each anywhere, numbered at random  */
-  PAIRS_NUM_DEALS
-} pairs_deal;
+enum { PAIRS_NUM_DEALS = TM_LAST + 1 }; /* the ways of tm_dealing */
 
 typedef struct pairs_world {
   rm_comm        comm;
@@ -77,22 +72,17 @@ static inline tm_mesh *pairs_whole_(pairs_kind kind, int side)
   }
 }
 
-/* This rank's part of a mesh. */
-static inline tm_mesh *pairs_part_(const tm_mesh *whole, pairs_deal deal)
+/* This rank's part of a mesh; renumbered at random if dealt at random. */
+static inline tm_mesh *pairs_part_(const tm_mesh *whole, tm_dealing deal)
 {
-  const int64_t num  = whole->view.num_cells;
-  int          *rank = malloc(((size_t)num + 1) * sizeof *rank);
-  uint64_t      state = 1;
-  tm_mesh      *part;
+  int     *rank = tm_deal(whole, rt_size(), deal, 1);
+  tm_mesh *part = tm_part(whole, rank, rt_rank(), deal == TM_RANDOM ? 7 : 0);
 
-  for (int64_t c = 0; c < num; c++)
-    rank[c] = deal == PAIRS_BLOCKS ? (int)(c * rt_size() / num) : deal == PAIRS_ONE ? rt_size() - 1 : (int)tm_random(&state, rt_size());
-  part = tm_part(whole, rank, rt_rank(), deal == PAIRS_RANDOM ? 7 : 0);
   free(rank);
   return part;
 }
 
-static inline void pairs_open(pairs_world *world, pairs_kind kind, pairs_deal deal)
+static inline void pairs_open(pairs_world *world, pairs_kind kind, tm_dealing deal)
 {
   tm_mesh   *part[2] = {NULL, NULL};
   remap_mesh view[2];

@@ -1,6 +1,7 @@
-/* cut -- intervals of Morton keys, one per rank, of even estimated work. The cuts are exact quantiles of the work over all ranks,
- * found by bisecting the range of keys: they depend on the zone's cells and not on who hands them in, and cells of equal key
- * stay together. O(n) time to sort n keys here; then ROUNDS sums over all ranks of WAYS - 1 numbers per cut, each a search of the keys. */
+/* cut -- intervals of Morton keys, one per rank, of even estimated work. The cuts are exact quantiles of the work over all
+ * ranks, found by bisecting the range of keys: they depend on the zone's cells and not on who hands them in, and cells of
+ * equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all ranks of WAYS - 1 numbers per cut, each a
+ * search of the keys. */
 #include "part/part_private.h"
 
 #include <float.h>
@@ -86,9 +87,10 @@ static rm_lid num_below(const rm_keyed *keyed, rm_lid num, uint64_t key)
   return low;
 }
 
-/* The estimate of the overlay's work, in pairs, that this rank's cells of keys below `key` cause: as many pairs as they are cells,
- * of both meshes. Where n source and m target cells fill the same place they make between max(n, m) and some eight times as many
- * pairs, so the sum is right to a small factor whichever mesh is finer, and follows the refinement of both from place to place. */
+/* The estimate of the overlay's work, in pairs, that this rank's cells of keys below `key` cause: as many pairs as they are
+ * cells, of both meshes. Where n source and m target cells fill the same place they make between max(n, m) and some eight
+ * times as many pairs, so the sum is right to a small factor whichever mesh is finer, and follows the refinement of both from
+ * place to place. */
 static int64_t work_below(const keys *k, uint64_t key)
 {
   return (int64_t)num_below(k->keyed[REMAP_SOURCE], k->num[REMAP_SOURCE], key) +

@@ -1,6 +1,6 @@
-/* match -- which source cells meet which rank's target cells. Every rank gathers the coarse boxes of every rank's targets; the boxes
- * of the source cells that meet those travel there, are held against the targets themselves, and the answers come back. So no
- * cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
+/* match -- which source cells meet which rank's target cells. Every rank gathers the coarse boxes of every rank's targets; the
+ * boxes of the source cells that meet those travel there, are held against the targets themselves, and the answers come back.
+ * So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
 #include "part/part_private.h"
 
 /* Where the targets are: those of this rank by box, those of all ranks by groups. */

@@ -1,5 +1,6 @@
-/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. Working memory of
- * a stage is dropped before the next one ships, so the peak is the product and what one mesh sends and receives. */
+/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What shipping one
+ * mesh needs on the way is dropped before the other ships, so memory peaks at the product, the keys and boxes of the zone, and
+ * what one mesh sends and receives. */
 #include "part/part_private.h"
 
 /* Where the cells of both meshes go. Collective. */
@@ -82,8 +83,8 @@ static bool senders_are_apart(const rm_piece *p, uint8_t *node_is_used)
   return true;
 }
 
-/* Every cell has faces, and they close it: each edge is used as often one way as the other. Edges are hashed and the hashes added
- * with the sign of their direction; a missing or turned face leaves a sum that is not zero but with a chance of 2^-64. */
+/* Every cell has faces, and they close it: each edge is used as often one way as the other. Edges are hashed and the hashes
+ * added with the sign of their direction; a missing or turned face leaves a sum that is not zero but with a chance of 2^-64. */
 static bool cells_are_closed(const rm_piece *p, uint64_t *sum, uint8_t *has_face)
 {
   for (rm_lid f = 0; f < p->num_faces; f++) {

@@ -1,5 +1,6 @@
-/* part -- the zone in; out the cells of both meshes that this rank overlays. Target cells are cut into contiguous intervals of the
- * Morton keys of their boxes' centres, at the quantiles of an estimate of their pairs: each goes to exactly one rank. A source cell goes to every rank that has a target cell whose box it meets. */
+/* part -- the zone in; out the cells of both meshes that this rank overlays. Target cells are cut into contiguous intervals of
+ * the Morton keys of their boxes' centres, at the quantiles of an estimate of their pairs: each goes to exactly one rank. A
+ * source cell goes to every rank that has a target cell whose box it meets. */
 #ifndef RM_PART_H
 #define RM_PART_H
 

@@ -19,13 +19,13 @@ remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_
 /* Morton key of the centre of a cell's box. Not collective. */
 uint64_t rm_part_key(const rm_frame *zone_frame, const double box[6]);
 
-/* Cut the target cells of the zone into one interval of keys per rank, of even work. Collective. *out lives in arena, as does what
- * is needed on the way. */
+/* Cut the target cells of the zone into one interval of keys per rank, of even work. Collective. *out lives in arena, as does
+ * what is needed on the way. */
 remap_status rm_part_cut(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                          const rm_zone *zone, rm_route *out);
 
-/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target` puts
- * them. Collective. *out lives in arena, as does what is needed on the way. */
+/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target`
+ * puts them. Collective. *out lives in arena, as does what is needed on the way. */
 remap_status rm_part_match(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
                            const rm_route *target, rm_route *out, rm_reason *reason);
 

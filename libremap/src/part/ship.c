@@ -1,6 +1,6 @@
-/* ship -- cells travel with their faces and nodes. For every destination the sender numbers what goes there anew; the receiver sets
- * the senders' parcels one after the other and shifts the numbers. Nodes and faces go once to each destination. O(n) time;
- * besides the product, memory for what is sent and for the cells and faces that arrive. */
+/* ship -- cells travel with their faces and nodes. For every destination the sender numbers what goes there anew; the receiver
+ * sets the senders' parcels one after the other and shifts the numbers. Nodes and faces go once to each destination. O(n)
+ * time; besides the product, memory for what is sent and for the cells and faces that arrive. */
 #include "part/part_private.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* boxtree -- a binary tree of boxes over items, split at the median of the centres along the axis on which they spread most.
- * Nodes lie in preorder: the first child follows its parent, so a query walks mostly forward. Building takes O(n log n) time and
- * 32 bytes per item besides the result; with leaves of n / 64 items the same split makes the coarse groups in O(n). */
+ * Nodes lie in preorder: the first child follows its parent, so a query walks mostly forward. Building takes O(n log n) time
+ * and 32 bytes per item besides the result; with leaves of n / 64 items the same split makes the coarse groups in O(n). */
 #include "zone/zone.h"
 
 enum { LEAF_ITEMS = 8, MAX_DEPTH = 64 };
@@ -40,12 +40,13 @@ static double median_of_three(double a, double b, double c)
   return c < low ? low : c > high ? high : c;
 }
 
-/* Permute place[begin, end) so that no centre before mid lies above, and none from mid on below, that of place[mid]. Expected O(n),
- * many equal centres included: a scan stops at them from either side. */
+/* Permute place[begin, end) so that no centre before mid lies above, and none from mid on below, that of place[mid]. Expected
+ * O(n), many equal centres included: a scan stops at them from either side. */
 static void select_median(place *p, rm_lid begin, rm_lid mid, rm_lid end, int axis)
 {
   while (end - begin > 1) {
-    const double pivot = median_of_three(p[begin].centre[axis], p[begin + (end - begin) / 2].centre[axis], p[end - 1].centre[axis]);
+    const double middle = p[begin + (end - begin) / 2].centre[axis];
+    const double pivot  = median_of_three(p[begin].centre[axis], middle, p[end - 1].centre[axis]);
     rm_lid       i = begin, j = end - 1;
 
     while (i <= j) {

@@ -1,6 +1,6 @@
-/* zone -- each rank groups its cells of each mesh into at most RM_ZONE_BOXES boxes, all ranks gather them, and a cell is listed if
- * its box meets a box of the other mesh. Every cell of the other mesh lies in one of the boxes, so a cell that is left out meets
- * none of them. O(n log B) time for n cells here and B boxes; B is at most RM_ZONE_BOXES per rank. */
+/* zone -- each rank groups its cells of each mesh into at most RM_ZONE_BOXES boxes, all ranks gather them, and a cell is
+ * listed if its box meets a box of the other mesh. Every cell of the other mesh lies in one of the boxes, so a cell that is
+ * left out meets none of them. O(n log B) time for n cells here and B boxes; B is at most RM_ZONE_BOXES per rank. */
 #include "zone/zone.h"
 
 /* The groups of one mesh: first this rank's, then, gathered, everybody's. */
@@ -25,10 +25,11 @@ static remap_status gather(rm_arena *scratch, const rm_comm *comm, remap_status 
 {
   RM_TRY(rm_comm_agree(comm, mine, NULL));
   for (int side = 0; side < 2; side++) {
-    void *box;
+    groups *g = &all[side];
+    void   *box;
 
-    RM_TRY(rm_comm_allgatherv(comm, scratch, all[side].mine, all[side].num_mine, sizeof *all[side].mine, all[side].offset, &box));
-    all[side].box = box;
+    RM_TRY(rm_comm_allgatherv(comm, scratch, g->mine, g->num_mine, sizeof *g->mine, g->offset, &box));
+    g->box = box;
   }
   return REMAP_OK;
 }

@@ -1,6 +1,6 @@
-/* zone -- two meshes in; out which of their cells can meet the other mesh at all (the overlap zone). What can never meet is left
- * behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh; nothing of global
- * size. O(n log B) time. */
+/* zone -- two meshes in; out which of their cells can meet the other mesh at all (the overlap zone). What can never meet is
+ * left behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh; nothing of
+ * global size. O(n log B) time. */
 #ifndef RM_ZONE_H
 #define RM_ZONE_H
 
