@@ -43,17 +43,29 @@ function(remap_mpi_test room thing exe)
   endforeach()
 endfunction()
 
+# remap_test_program(<target> <file> <libraries...>): what programs that see the rooms have in common.
+function(remap_test_program exe file)
+  target_include_directories(${exe} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support ${PROJECT_SOURCE_DIR}/libremap/src)
+  target_compile_options(${exe} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=) # short paths in messages
+  target_link_libraries(${exe} PRIVATE ${ARGN} remap_static remap_warnings)
+  set_property(GLOBAL APPEND PROPERTY REMAP_TEST_FILES ${file})
+endfunction()
+
 # remap_test(<room> <thing> [RANKS 1 2 3 4] [TIMEOUT <seconds>] [LIBS <targets>]): tests/<room>/test_<thing>.c as one program
 # that sees the rooms' headers, and one CTest entry per number of ranks. room may be adapters/cgns.
 function(remap_test room thing)
   cmake_parse_arguments(PARSE_ARGV 2 T "" "TIMEOUT" "RANKS;LIBS")
   string(REPLACE / _ exe test_${room}_${thing})
   add_executable(${exe} ${room}/test_${thing}.c)
-  target_include_directories(${exe} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support ${PROJECT_SOURCE_DIR}/libremap/src)
-  target_compile_options(${exe} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=) # short paths in messages
-  target_link_libraries(${exe} PRIVATE ${T_LIBS} remap_static remap_warnings)
-  set_property(GLOBAL APPEND PROPERTY REMAP_TEST_FILES ${room}/test_${thing}.c)
+  remap_test_program(${exe} ${room}/test_${thing}.c ${T_LIBS})
   remap_mpi_test(${room} ${thing} ${exe} RANKS ${T_RANKS} TIMEOUT ${T_TIMEOUT})
+endfunction()
+
+# remap_bench(<thing> [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not run.
+function(remap_bench thing)
+  cmake_parse_arguments(PARSE_ARGV 1 T "" "" "LIBS")
+  add_executable(bench_${thing} bench/bench_${thing}.c)
+  remap_test_program(bench_${thing} bench/bench_${thing}.c ${T_LIBS})
 endfunction()
 
 # remap_script_test(<room> <thing> <command...>): a test that is a script.
@@ -62,7 +74,8 @@ function(remap_script_test room thing)
   remap_test_properties(${room}.${thing} ${room} 1)
 endfunction()
 
-# remap_tests_complete(): a test that fails if a file tests/**/test_*.c is named by no remap_test().
+# remap_tests_complete(): a test that fails if a file tests/**/test_*.c or bench_*.c is named by no remap_test() or
+# remap_bench().
 function(remap_tests_complete)
   get_property(named GLOBAL PROPERTY REMAP_TEST_FILES)
   list(JOIN named "\n" text)
