@@ -1,12 +1,12 @@
 /* predicates -- exact signs of 3x3 determinants and of components of cross products, with simulation of simplicity.
  *
  * Five stages, each asked only if the one before cannot tell:
- *   1. the determinant in doubles against its rounding error bound (Shewchuk 1997, stage A): 3 ns;
+ *   1. the determinant in doubles against its rounding error bound (Shewchuk 1997, stage A): 4 ns;
  *   2. exact zeros for free: every product is zero (a shared point, points in an axis-parallel plane; nothing underflows, see
  *      below), or two of the points coincide: 4-6 ns;
- *   3. integers of 64 and 128 bits, if the coordinates are multiples of 2^-61 of the largest of them, as nearly all are: 20-30 ns;
- *   4. the determinant in double-double against its bound (3x3 only): 60 ns;
- *   5. integers of any length (exact.h): 200-400 ns.
+ *   3. integers of 64 and 128 bits, if the coordinates are multiples of 2^-61 of the largest of them, as nearly all are: 30 ns;
+ *   4. the determinant in double-double against its bound (3x3 only): 30 ns;
+ *   5. integers of any length (exact.h): 300 ns.
  *
  * Coordinates are multiples of 2^-152 (geom.h), so a product of three differences is 0 or at least 2^-456 and every rounding error
  * in it a multiple of 2^-456: underflow does not occur and the bounds hold as they stand. */

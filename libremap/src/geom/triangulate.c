@@ -5,7 +5,7 @@
  * order; a loop given the other way round only has its triangles turned at the end. A loop that passes through one point more
  * than once is cut there into parts. So the boundary of the triangles is the loop, edge by edge, whatever its shape.
  *
- * Cost: about 20 ns for a triangle, 80 ns for a quadrangle; O(n) for a fan besides the search for repeated points, which is
+ * Cost: about 20 ns for a triangle, 50-75 ns for a quadrangle; O(n) for a fan besides the search for repeated points, which is
  * O(n^2) as ears are. */
 #include "geom/geom_private.h"
 
