@@ -1,0 +1,69 @@
+/* integral -- what a transfer takes from the giving cells and what arrives, summed without rounding, so that the report is the
+ * same on any number of ranks and shows the error of the transfer, not that of a sum. O(cells + pairs of partial cells). */
+#include "field_private.h"
+
+/* A partial cell gives what its pairs hold. Its rows have moments about the receiving cells' centroids; they are taken back. */
+static void add_partial(const rm_rows *rows, rm_lid cell, const double centroid[3], double value, const double slope[3],
+                        rm_integral *integral)
+{
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    const double  volume = rows->volume[k];
+    const double *c      = rows->giver_centroid[rows->giver[k]];
+
+    rm_integral_add(&integral->source, value, volume);
+    rm_integral_add(&integral->magnitude, fabs(value), fabs(volume));
+    for (int d = 0; d < 3 && slope; d++)
+      rm_integral_add(&integral->source, slope[d], rows->moment[k][d] + (c[d] - centroid[d]) * volume);
+  }
+}
+
+void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const remap_field_desc *fields,
+                        const rm_packing *packing, const double *pack, rm_integral *integral)
+{
+  const rm_rows *rows = setup->giving_rows;
+  const rm_mesh *mesh = setup->giving;
+
+  for (int f = 0; f < num_fields; f++) {
+    if (fields[f].nature == REMAP_FLAG) continue;
+    for (rm_lid c = 0; c < mesh->num_cells; c++) {
+      const double *place  = pack + (int64_t)c * packing->width + packing->at[f];
+      const double  value  = packing->scale[f] * place[0];
+      const double *slope  = packing->order[f] > 1 ? place + RM_PACK_SLOPE : NULL;
+      const double  volume = mesh->cell_volume[c];
+
+      if (rows->cover[c] == REMAP_COVERED) {
+        rm_integral_add(&integral[f].source, value, volume);
+        rm_integral_add(&integral[f].magnitude, fabs(value), fabs(volume));
+      } else if (rows->cover[c] == REMAP_PARTIAL) {
+        add_partial(rows, c, mesh->cell_centroid[c], value, slope, &integral[f]);
+      }
+    }
+  }
+}
+
+remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_packing *packing,
+                                rm_integral *integral, remap_field_report *reports)
+{
+  const double unit = setup->frame->scale * setup->frame->scale * setup->frame->scale; /* a power of two */
+  const int    n    = num_fields;
+  rm_sum      *sum  = rm_arena_alloc(scratch, 3 * (int64_t)n, sizeof *sum);
+
+  RM_TRY(rm_comm_agree(setup->comm, sum ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(sum);
+  for (int f = 0; f < n; f++) {
+    sum[f]         = integral[f].source;
+    sum[n + f]     = integral[f].minus_target;
+    sum[2 * n + f] = integral[f].magnitude;
+  }
+  RM_TRY(rm_comm_sum_exact(setup->comm, sum, 3 * n));
+  for (int f = 0; f < n && reports; f++) {
+    const double magnitude = rm_sum_value(&sum[2 * n + f]);
+    const double scale     = packing->scale[f];
+
+    reports[f].source_integral = rm_sum_value(&sum[f]) / scale / unit;
+    reports[f].target_integral = (0.0 - rm_sum_value(&sum[n + f])) / scale / unit;
+    rm_sum_merge(&sum[f], &sum[n + f]);
+    reports[f].conservation_error = magnitude > 0.0 ? fabs(rm_sum_value(&sum[f])) / magnitude : 0.0;
+  }
+  return REMAP_OK;
+}
