@@ -127,7 +127,7 @@ typedef struct remap_options {
   remap_faces faces;     /**< triangulation of faces, both meshes; default REMAP_FACES_CENTRE */
   int         max_order; /**< highest order that remap_field will be asked for: 1, 2; default 2 */
   int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP where zones of one mesh overlap by more
-                                          than rounding inside the other mesh; 0 (default): counted in remap_stats */
+                                          than rounding inside the other mesh; 0 (default): remap_stats tells */
 
   /** Called with one line of text for a human, without a newline; any rank may call. NULL: silence. */
   void (*log)(void *user, const char *line);
@@ -188,7 +188,7 @@ typedef struct remap_field_report {
   int64_t limited_cells;      /**< giving cells whose slope was reduced */
 } remap_field_report;
 
-/** What remap_build found, over all ranks; the same on every rank. Volumes in the caller's unit cubed. */
+/** What remap_build found, over all ranks; the same on every rank but for seconds_transfer. Volumes in the caller's unit cubed. */
 typedef struct remap_stats {
   int     ranks;
   int64_t cells[2];               /**< [side] */
@@ -199,10 +199,12 @@ typedef struct remap_stats {
   int64_t cells_by_cover[2][3];   /**< [side][remap_cover] */
   double  max_closure_error[2];   /**< [side] largest abs(sum of V over the cell's pairs / cell volume - 1), covered cells */
   int64_t worst_closure_cell[2];  /**< [side] its global id, -1 if none is covered */
-  double  zone_overlap_volume[2]; /**< [side] volume in which cells of the mesh itself overlap, as far as the other mesh
-                                       sees it; rounding at patched zones shows here */
+  double  zone_overlap[2];        /**< [side] largest volume shared by two cells of different zones of the mesh, where they
+                                       overlap by more than rounding and the other mesh sees it; 0: none */
+  int64_t zone_overlap_cell[2][2]; /**< [side] their global ids, -1 if none */
   int64_t crossings;              /**< edges of one mesh through triangles of the other */
-  double  seconds_partition, seconds_overlay, seconds_transfer; /**< wall clock, slowest rank; transfer: all calls so far */
+  double  seconds_partition, seconds_overlay; /**< wall clock, slowest rank */
+  double  seconds_transfer; /**< wall clock of all calls of remap_field since, on this rank */
 } remap_stats;
 
 /** Pairs of one direction as rows of a sparse matrix, one row per receiving cell of this rank. A view: owned by the
@@ -260,8 +262,9 @@ REMAP_API const char *remap_message(const remap_context *ctx);
 /** Statistics of the last remap_build. Not collective. Errors: BAD_ORDER. */
 REMAP_API remap_status remap_get_stats(const remap_context *ctx, remap_stats *out);
 
-/** The pairs, as rows of the receiving mesh. Not collective. *out is a view owned by the context. Errors: BAD_ORDER. */
-REMAP_API remap_status remap_pairs(const remap_context *ctx, remap_direction direction, remap_pairs_view *out);
+/** The pairs, as rows of the receiving mesh. Not collective. *out is a view owned by the context, made at the first call.
+ *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY. */
+REMAP_API remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out);
 
 /** How much of each cell of one side is covered by the other mesh. Not collective. fraction and cover, [cells of that side
  *  on this rank], are the caller's; either may be NULL. Errors: BAD_ORDER. */

@@ -1,0 +1,37 @@
+/* context -- what stands behind remap_context. The only room that sees every other; seen by none. */
+#ifndef RM_CONTEXT_H
+#define RM_CONTEXT_H
+
+#include "field/field.h"
+
+/* Names of one mesh, copied so that messages can use them after the caller's arrays are gone. */
+typedef struct rm_labels {
+  const char        *mesh; /* never NULL */
+  int64_t            num_zones;
+  const char *const *zone;             /* [num_zones]     */
+  const int64_t     *zone_cell_offset; /* [num_zones + 1] */
+} rm_labels;
+
+struct remap_context {
+  rm_comm       comm;
+  remap_options options;
+  remap_mesh    given[2];
+  bool          is_set[2];
+  bool          is_built;
+  double        seconds_transfer;
+  char          message[1024];
+
+  rm_arena         *arena; /* of everything below, dropped by the next remap_build */
+  rm_labels         labels[2];
+  rm_frame          frame;
+  const rm_mesh    *mesh[2];
+  const rm_mapping *mapping;
+  const rm_stencil *stencil[2]; /* made when first needed */
+  remap_pairs_view  view[2];    /* likewise; row_offset NULL until then */
+  remap_stats       stats;
+};
+
+/* Put what *reason says about a failure into the context's message, with mesh, zone and cell by name. Not collective. */
+void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason);
+
+#endif

@@ -1,0 +1,72 @@
+/* views -- what callers may look at after remap_build, in their own unit. */
+#include <string.h>
+#include "api/context.h"
+
+remap_status remap_get_stats(const remap_context *ctx, remap_stats *out)
+{
+  RM_REQUIRE(ctx && out, REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  *out                  = ctx->stats;
+  out->seconds_transfer = ctx->seconds_transfer;
+  return REMAP_OK;
+}
+
+remap_status remap_cells(const remap_context *ctx, remap_side side, double *volume, double *centroid)
+{
+  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  const rm_mesh *m = ctx->mesh[side];
+  const double   unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    if (volume) volume[c] = m->cell_volume[c] * cubed;
+    if (centroid)
+      for (int a = 0; a < 3; a++) centroid[3 * (int64_t)c + a] = m->cell_centroid[c][a] * unit;
+  }
+  return REMAP_OK;
+}
+
+remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover)
+{
+  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  const rm_rows *rows = &ctx->mapping->rows[side];
+
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    double sum = 0;
+    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++) sum += rows->volume[k];
+    const double own = ctx->mesh[side]->cell_volume[c];
+    if (fraction) fraction[c] = rows->cover[c] == REMAP_COVERED ? 1 : own != 0 ? sum / own : 0;
+    if (cover) cover[c] = (remap_cover)rows->cover[c];
+  }
+  return REMAP_OK;
+}
+
+remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out)
+{
+  RM_REQUIRE(ctx && out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  const rm_rows    *rows = &ctx->mapping->rows[direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE];
+  const double      unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+  const int64_t     n = rows->offset[rows->num_cells];
+  remap_pairs_view *view = &ctx->view[direction];
+  int64_t          *global;
+  int              *rank;
+  double           *volume, *moment;
+
+  if (!view->row_offset) {
+    RM_NEW(global, ctx->arena, n);
+    RM_NEW(rank, ctx->arena, n);
+    RM_NEW(volume, ctx->arena, n);
+    RM_NEW(moment, ctx->arena, 3 * n);
+    for (int64_t k = 0; k < n; k++) {
+      global[k] = rows->giver_global[rows->giver[k]];
+      rank[k]   = rows->giver_rank[rows->giver[k]];
+      volume[k] = rows->volume[k] * cubed;
+      for (int a = 0; a < 3; a++) moment[3 * k + a] = rows->moment[k][a] * cubed * unit;
+    }
+    *view = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same};
+  }
+  *out = *view;
+  return REMAP_OK;
+}
