@@ -67,23 +67,25 @@ void rm_sum_carry(rm_sum *sum)
   sum->added = 1;
 }
 
-/* 64 bits of a carried, non-negative number from bit `from` upwards; bits below 0 are 0. */
+static uint64_t limb_or_zero(const rm_sum *sum, int k) { return k >= 0 && k < RM_SUM_LIMBS ? (uint64_t)sum->limb[k] : 0; }
+
+/* 64 bits of a carried, non-negative number from bit `from` upwards, from >= -64; bits below 0 are 0. */
 static uint64_t bits_from(const rm_sum *sum, int from)
 {
-  uint64_t bits = 0;
+  const int      k = (from + 64) / 32 - 2, shift = (from + 64) % 32;
+  const uint64_t low = limb_or_zero(sum, k) | limb_or_zero(sum, k + 1) << 32, high = limb_or_zero(sum, k + 2);
 
-  for (int b = 0; b < 64; b++) {
-    const int at = from + b;
-
-    if (at >= 0) bits |= ((uint64_t)sum->limb[at / 32] >> at % 32 & 1) << b;
-  }
-  return bits;
+  return shift ? low >> shift | high << (64 - shift) : low;
 }
 
 static bool any_bit_below(const rm_sum *sum, int end)
 {
-  for (int at = 0; at < end; at++)
-    if ((uint64_t)sum->limb[at / 32] >> at % 32 & 1) return true;
+  for (int k = 0; 32 * k < end; k++) {
+    const int      kept = end - 32 * k; /* bits of this limb that count */
+    const uint64_t mask = kept < 32 ? (UINT64_C(1) << kept) - 1 : UINT32_MAX;
+
+    if ((uint64_t)sum->limb[k] & mask) return true;
+  }
   return false;
 }
 
