@@ -20,7 +20,7 @@ enum {
 /* Read-only once built. Invariants:
  *   vertices are distinct and ascend in (Morton key, x, y, z); triangles have ascending corners and ascend lexicographically
  *   except that copies of one triangle that do not join stand side by side; edges ascend lexicographically;
- *   the normal of a triangle, (v1 - v0) x (v2 - v0), points from its left cell to its right one;
+ *   the normal of a triangle, (v1 - v0) x (v2 - v0), points from its left cell to its right one, and cells are closed;
  *   edge h of a triangle joins corners (0,1), (1,2), (0,2): its boundary runs along the first two and against the third. */
 typedef struct rm_trimesh {
   rm_lid         num_vertices, num_triangles, num_edges, num_cells, num_skin;
@@ -54,8 +54,8 @@ typedef struct rm_trimesh {
 /* Triangulate a piece. Not collective. Lives in arena. O(n). TOO_LARGE beyond 2^29 triangles. */
 remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
                               const rm_trimesh **out);
-/* Every invariant above; slow. Not collective. */
-remap_status rm_trimesh_check(const rm_trimesh *mesh);
+/* Every invariant above; slow. Not collective. frame is the one the mesh was built with. INTERNAL if one is broken. */
+remap_status rm_trimesh_check(const rm_frame *frame, const rm_trimesh *mesh);
 
 /* A crossing of an edge with a triangle of the other mesh. */
 typedef struct rm_crossing {

@@ -1,0 +1,252 @@
+/* trimesh_check -- tests every invariant of a triangulated piece. Each list is compared with what the triangles themselves say: a
+ * list of the right length whose entries are right and ascend is complete. O(n), O(cells' edges squared) for the cells' own
+ * numbering, O(n log n) for the tree. */
+#include "overlay/overlay.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Corners that bound edge h of a triangle. */
+static const int low_corner[3] = {0, 1, 0}, high_corner[3] = {1, 2, 2};
+
+static inline bool holds(const rm_lid *list, int64_t first, int64_t last, rm_lid x)
+{
+  for (int64_t k = first; k < last; k++)
+    if (list[k] == x) return true;
+  return false;
+}
+
+static int compare_lids(const rm_lid *a, const rm_lid *b, int n)
+{
+  for (int k = 0; k < n; k++)
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  return 0;
+}
+
+static void empty_box(double box[6])
+{
+  for (int c = 0; c < 3; c++) box[c] = INFINITY, box[c + 3] = -INFINITY;
+}
+static void widen_box(double box[6], const double p[3])
+{
+  for (int c = 0; c < 3; c++) box[c] = fmin(box[c], p[c]), box[c + 3] = fmax(box[c + 3], p[c]);
+}
+static bool same_box(const double a[6], const double b[6])
+{
+  for (int c = 0; c < 6; c++)
+    if (a[c] != b[c]) return false;
+  return true;
+}
+
+/* ---- entities ---------------------------------------------------------------------------------------------------- */
+
+static bool vertices_are_right(const rm_trimesh *m, const rm_frame *frame)
+{
+  double   box[6];
+  uint64_t last_key = 0;
+
+  empty_box(box);
+  for (rm_lid v = 0; v < m->num_vertices; v++) {
+    const double  *p = m->vertex[v], *q = m->vertex[v ? v - 1 : 0];
+    const uint64_t key = rm_morton(frame, p);
+    int            c   = 0;
+
+    for (int a = 0; a < 3; a++)
+      if (!isfinite(p[a]) || (p[a] == 0 && signbit(p[a]))) return false;
+    while (c < 2 && p[c] == q[c]) c++;
+    if (v && (key < last_key || (key == last_key && p[c] <= q[c]))) return false;
+    last_key = key;
+    widen_box(box, p);
+  }
+  return same_box(box, m->box);
+}
+
+/* The rounded normal is within its rounding of the exact one, component by component. */
+static bool normal_is_right(const rm_trimesh *m, rm_lid t)
+{
+  const double *a = m->vertex[m->triangle[t][0]], *b = m->vertex[m->triangle[t][1]], *c = m->vertex[m->triangle[t][2]];
+  double        length = 0;
+
+  for (int k = 0; k < 3; k++) length = fmax(length, fmax(fabs(b[k] - a[k]), fabs(c[k] - a[k])));
+  for (int k = 0; k < 3; k++) {
+    double end[3] = {a[0], a[1], a[2]};
+    end[k] += length > 0 ? length : 1; /* det[b - a, c - a, end - a] is the normal's component times the step */
+    const rm_dd  d    = rm_det_dd(a, b, c, end);
+    const double step = end[k] - a[k];
+    if (!(fabs(m->normal[t][k] * step - d.hi) <= 0x1p-48 * length * length * step)) return false;
+  }
+  return true;
+}
+
+/* Copies of one triangle stand side by side, are no two that would have joined, and have one side each. */
+static bool triangles_are_right(const rm_trimesh *m)
+{
+  for (rm_lid t = 0; t < m->num_triangles; t++) {
+    const rm_lid *v = m->triangle[t], *side = m->side[t];
+    const int     order     = t ? compare_lids(m->triangle[t - 1], v, 3) : -1;
+    const bool    one_sided = side[0] == RM_OUTSIDE || side[1] == RM_OUTSIDE;
+
+    if (v[0] < 0 || v[0] >= v[1] || v[1] >= v[2] || v[2] >= m->num_vertices || order > 0) return false;
+    if (side[0] < RM_OUTSIDE || side[1] < RM_OUTSIDE || side[0] >= m->num_cells || side[1] >= m->num_cells) return false;
+    if (side[0] == RM_OUTSIDE && side[1] == RM_OUTSIDE) return false;
+    if (m->triangle_is_skin[t] > one_sided || !normal_is_right(m, t)) return false;
+    if (order) continue;
+    if (!one_sided || (m->side[t - 1][0] != RM_OUTSIDE && m->side[t - 1][1] != RM_OUTSIDE)) return false;
+    const bool alone = (t < 2 || compare_lids(m->triangle[t - 2], v, 3)) &&
+                       (t + 1 == m->num_triangles || compare_lids(m->triangle[t + 1], v, 3));
+    if (alone && (side[0] == RM_OUTSIDE) != (m->side[t - 1][0] == RM_OUTSIDE)) return false;
+  }
+  return true;
+}
+
+static bool edges_are_right(const rm_trimesh *m)
+{
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 3; h++) {
+      const rm_lid e = m->triangle_edge[t][h];
+      if (e < 0 || e >= m->num_edges) return false;
+      if (m->edge[e][0] != m->triangle[t][low_corner[h]] || m->edge[e][1] != m->triangle[t][high_corner[h]]) return false;
+    }
+  if (m->star_offset[0] != 0 || m->star_offset[m->num_edges] != 3 * m->num_triangles) return false;
+  for (rm_lid e = 0; e < m->num_edges; e++) {
+    if (e && compare_lids(m->edge[e - 1], m->edge[e], 2) >= 0) return false;
+    if (m->star_offset[e] >= m->star_offset[e + 1]) return false;
+    for (rm_lid k = m->star_offset[e]; k < m->star_offset[e + 1]; k++) {
+      const rm_lid s = m->star[k];
+      if (s < 0 || s / 4 >= m->num_triangles || (s & 3) == 3 || m->triangle_edge[s / 4][s & 3] != e) return false;
+      if (k > m->star_offset[e] && m->star[k - 1] >= s) return false;
+    }
+  }
+  return true;
+}
+
+static bool vertex_edges_are_right(const rm_trimesh *m)
+{
+  if (m->vertex_edge_offset[0] != 0 || m->vertex_edge_offset[m->num_vertices] != 2 * m->num_edges) return false;
+  for (rm_lid v = 0; v < m->num_vertices; v++)
+    for (rm_lid k = m->vertex_edge_offset[v]; k < m->vertex_edge_offset[v + 1]; k++) {
+      const rm_lid e = m->vertex_edge[k];
+      if (e < 0 || e >= m->num_edges || (m->edge[e][0] != v && m->edge[e][1] != v)) return false;
+      if (k > m->vertex_edge_offset[v] && m->vertex_edge[k - 1] >= e) return false;
+    }
+  return true;
+}
+
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
+
+static bool cell_triangles_are_right(const rm_trimesh *m)
+{
+  int64_t num_sides = 0;
+
+  for (rm_lid t = 0; t < m->num_triangles; t++) num_sides += (m->side[t][0] >= 0) + (m->side[t][1] >= 0);
+  if (m->cell_triangle_offset[0] != 0 || m->cell_triangle_offset[m->num_cells] != num_sides) return false;
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    double box[6];
+
+    empty_box(box);
+    for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++) {
+      const rm_lid x = m->cell_triangle[a];
+      if (x < 0 || x / 2 >= m->num_triangles || m->side[x / 2][x & 1] != c) return false;
+      if (a > m->cell_triangle_offset[c] && m->cell_triangle[a - 1] >= x) return false;
+      for (int h = 0; h < 3; h++) widen_box(box, m->vertex[m->triangle[x / 2][h]]);
+    }
+    if (!same_box(box, m->cell_box[c])) return false;
+  }
+  return true;
+}
+
+/* Every edge of every cell is used as often one way as the other. balance is [num_edges], all 0. */
+static bool cells_are_closed(const rm_trimesh *m, int *balance)
+{
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    const rm_lid first = m->cell_triangle_offset[c], last = m->cell_triangle_offset[c + 1];
+    bool         closed = true;
+
+    for (rm_lid a = first; a < last; a++)
+      for (int h = 0; h < 3; h++)
+        balance[m->triangle_edge[m->cell_triangle[a] / 2][h]] += (h == 2) != (m->cell_triangle[a] & 1) ? -1 : 1;
+    for (rm_lid a = first; a < last; a++)
+      for (int h = 0; h < 3; h++) {
+        int *b = &balance[m->triangle_edge[m->cell_triangle[a] / 2][h]];
+        closed = closed && *b == 0;
+        *b     = 0;
+      }
+    if (!closed) return false;
+  }
+  return true;
+}
+
+/* The numbering of edges and vertices within cell c, if it has one. */
+static bool local_numbers_are_right(const rm_trimesh *m, rm_lid c)
+{
+  const rm_lid first = m->cell_edge_offset[c], num_edges = m->cell_edge_offset[c + 1] - first;
+  const rm_lid first_vertex = m->cell_vertex_offset[c], num_vertices = m->cell_vertex_offset[c + 1] - first_vertex;
+  const rm_lid begin = m->cell_triangle_offset[c], end = m->cell_triangle_offset[c + 1];
+
+  if (num_edges < 0 || num_vertices < 0 || m->cell_by_tree[c] > 1) return false;
+  if (num_edges == 0) return num_vertices == 0 && m->cell_by_tree[c] == 1;
+  for (rm_lid v = 0; v < num_vertices; v++) {
+    bool used = false;
+    for (rm_lid f = 0; f < num_edges && !used; f++)
+      used = m->cell_edge_end[first + f][0] == v || m->cell_edge_end[first + f][1] == v;
+    if (!used || holds(m->cell_vertex, first_vertex, first_vertex + v, m->cell_vertex[first_vertex + v])) return false;
+  }
+  for (rm_lid f = 0; f < num_edges; f++) {
+    bool used = false;
+    for (int h = 0; h < 2; h++) {
+      const int place = m->cell_edge_end[first + f][h];
+      if (place >= num_vertices || m->cell_vertex[first_vertex + place] != m->edge[m->cell_edge[first + f]][h]) return false;
+    }
+    for (rm_lid a = begin; a < end && !used; a++)
+      for (int h = 0; h < 3; h++) used |= m->cell_triangle_edge[a][h] == f;
+    if (!used || holds(m->cell_edge, first, first + f, m->cell_edge[first + f])) return false;
+  }
+  for (rm_lid a = begin; a < end; a++)
+    for (int h = 0; h < 3; h++) {
+      const int place = m->cell_triangle_edge[a][h];
+      if (place >= num_edges || m->cell_edge[first + place] != m->triangle_edge[m->cell_triangle[a] / 2][h]) return false;
+    }
+  return true;
+}
+
+/* ---- skin -------------------------------------------------------------------------------------------------------- */
+
+typedef struct wanted {
+  rm_lid item;
+} wanted;
+
+static int is_wanted(void *user, rm_lid item) { return item == ((const wanted *)user)->item; }
+
+static bool skin_is_right(const rm_trimesh *m)
+{
+  rm_lid s = 0;
+
+  for (rm_lid t = 0; t < m->num_triangles; t++) {
+    double box[6];
+    wanted self = {s};
+
+    if (m->side[t][0] >= 0 && m->side[t][1] >= 0) continue;
+    if (s == m->num_skin || m->skin[s] != t) return false;
+    empty_box(box);
+    for (int h = 0; h < 3; h++) widen_box(box, m->vertex[m->triangle[t][h]]);
+    if (!same_box(box, m->skin_box[s]) || !rm_boxtree_query(m->skin_tree, m->skin_box, box, is_wanted, &self)) return false;
+    s++;
+  }
+  return s == m->num_skin && m->skin_tree->num_items == s;
+}
+
+remap_status rm_trimesh_check(const rm_frame *frame, const rm_trimesh *mesh)
+{
+  rm_arena    *scratch = rm_arena_new();
+  int         *balance = scratch ? rm_arena_zero(scratch, mesh->num_edges, sizeof *balance) : NULL;
+  remap_status status  = balance ? REMAP_OK : REMAP_NO_MEMORY;
+
+  if (status == REMAP_OK &&
+      !(vertices_are_right(mesh, frame) && triangles_are_right(mesh) && edges_are_right(mesh) && vertex_edges_are_right(mesh) &&
+        cell_triangles_are_right(mesh) && cells_are_closed(mesh, balance) && skin_is_right(mesh)))
+    status = REMAP_INTERNAL;
+  for (rm_lid c = 0; c < mesh->num_cells && status == REMAP_OK; c++)
+    if (!local_numbers_are_right(mesh, c)) status = REMAP_INTERNAL;
+  rm_arena_drop(scratch);
+  return status;
+}
