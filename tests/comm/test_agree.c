@@ -207,5 +207,7 @@ RT_MAIN(RT_CASE(a_duplicate_knows_its_rank_and_size_and_returns_errors), RT_CASE
         RT_CASE(worst_status_wins_on_every_rank), RT_CASE(among_equal_statuses_the_lowest_rank_is_named),
         RT_CASE(all_ok_stays_ok_and_leaves_the_reason), RT_CASE(the_worst_reason_is_everybodys),
         RT_CASE(reductions_are_elementwise), RT_CASE(an_exclusive_scan_counts_the_lower_ranks),
-        RT_CASE(exact_sums_are_exact_and_do_not_see_the_partition), RT_CASE(gathering_is_the_same_in_one_piece_and_in_small_ones),
-        RT_CASE(gathering_lists_of_any_length_keeps_the_order_of_ranks), RT_CASE(a_rank_without_memory_stops_gathering_everywhere))
+        RT_CASE(exact_sums_are_exact_and_do_not_see_the_partition),
+        RT_CASE(gathering_is_the_same_in_one_piece_and_in_small_ones),
+        RT_CASE(gathering_lists_of_any_length_keeps_the_order_of_ranks),
+        RT_CASE(a_rank_without_memory_stops_gathering_everywhere))

@@ -11,15 +11,9 @@ static rm_comm world(void)
 }
 
 /* How many items rank src sends to rank dst: nothing, a few, or many. */
-static int64_t amount(int src, int dst, int most)
-{
-  return (int64_t)((unsigned)(7 * src + 13 * dst + 5) % 4) * most / 3;
-}
+static int64_t amount(int src, int dst, int most) { return (int64_t)((unsigned)(7 * src + 13 * dst + 5) % 4) * most / 3; }
 /* The i-th of them. */
-static int64_t word(int src, int dst, int64_t i)
-{
-  return ((int64_t)src * 1000 + dst) * 1000000 + i;
-}
+static int64_t word(int src, int dst, int64_t i) { return ((int64_t)src * 1000 + dst) * 1000000 + i; }
 
 /* Exchange amount() items of 1 + extra words, and compare. */
 static void exchange_and_check(const rm_comm *comm, int64_t chunk, int most, int extra)
@@ -37,7 +31,8 @@ static void exchange_and_check(const rm_comm *comm, int64_t chunk, int most, int
     for (int64_t i = send_offset[r]; i < send_offset[r + 1]; i++)
       for (int w = 0; w < width; w++) send[i * width + w] = word(me, r, i - send_offset[r]) + w;
 
-  RT_EQ(rm_comm_exchange_chunked(comm, chunk, arena, sizeof *send * (size_t)width, send_offset, send, recv_offset, &recv), REMAP_OK);
+  RT_EQ(rm_comm_exchange_chunked(comm, chunk, arena, sizeof *send * (size_t)width, send_offset, send, recv_offset, &recv),
+        REMAP_OK);
   RT_EQ(recv_offset[0], 0);
   for (int r = 0; r < comm->size; r++) {
     RT_EQ(recv_offset[r + 1] - recv_offset[r], amount(r, me, most));
@@ -162,7 +157,7 @@ static void only_neighbours_take_part_in_a_plan(void)
   /* Only the last rank wants something, of the first: the others run nothing at all, not even this call. */
   RT_EQ(rm_plan_build(&comm, arena, comm.rank == comm.size - 1, &rank, &item, &plan), REMAP_OK);
   if (rt_all(plan != NULL) && (comm.rank == 0 || comm.rank == comm.size - 1)) {
-    const double mine[4] = {0.0, 1.0, 2.0, 3.0};
+    const double mine[4]  = {0.0, 1.0, 2.0, 3.0};
     double       received = 0.0, buffer;
 
     RT_EQ(plan->num_send, comm.rank == 0);

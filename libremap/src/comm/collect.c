@@ -69,15 +69,9 @@ remap_status rm_comm_max_i64(const rm_comm *comm, int64_t *value, int n)
   return reduce(comm, value, n, MPI_INT64_T, MPI_MAX);
 }
 
-remap_status rm_comm_max_f64(const rm_comm *comm, double *value, int n)
-{
-  return reduce(comm, value, n, MPI_DOUBLE, MPI_MAX);
-}
+remap_status rm_comm_max_f64(const rm_comm *comm, double *value, int n) { return reduce(comm, value, n, MPI_DOUBLE, MPI_MAX); }
 
-remap_status rm_comm_min_f64(const rm_comm *comm, double *value, int n)
-{
-  return reduce(comm, value, n, MPI_DOUBLE, MPI_MIN);
-}
+remap_status rm_comm_min_f64(const rm_comm *comm, double *value, int n) { return reduce(comm, value, n, MPI_DOUBLE, MPI_MIN); }
 
 remap_status rm_comm_sum_exact(const rm_comm *comm, rm_sum *sum, int n)
 {

@@ -111,16 +111,16 @@ static int keep_neighbours(int num_ranks, int64_t *offset, int *rank)
   return num;
 }
 
-remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank, const rm_lid *want_item,
-                           const rm_plan **out)
+remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank,
+                           const rm_lid *want_item, const rm_plan **out)
 {
-  rm_plan *plan        = rm_arena_zero(arena, 1, sizeof *plan);
-  int64_t *recv_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *recv_offset);
-  int64_t *send_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *send_offset);
-  int     *send_rank   = rm_arena_alloc(arena, comm->size, sizeof *send_rank);
-  int     *recv_rank   = rm_arena_alloc(arena, comm->size, sizeof *recv_rank);
-  void    *asked       = NULL;
-  const bool have      = plan && recv_offset && send_offset && send_rank && recv_rank;
+  rm_plan   *plan        = rm_arena_zero(arena, 1, sizeof *plan);
+  int64_t   *recv_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *recv_offset);
+  int64_t   *send_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *send_offset);
+  int       *send_rank   = rm_arena_alloc(arena, comm->size, sizeof *send_rank);
+  int       *recv_rank   = rm_arena_alloc(arena, comm->size, sizeof *recv_rank);
+  void      *asked       = NULL;
+  const bool have        = plan && recv_offset && send_offset && send_rank && recv_rank;
 
   RM_TRY(rm_comm_agree(comm, have ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   for (int64_t k = 0; k < num_want; k++) {
@@ -156,8 +156,8 @@ static void pack(const rm_plan *plan, size_t size, const char *item, char *buffe
 
 /* Post the chunk that starts `at` bytes into each message to or from the ranks of a plan; *largest grows to the longest. */
 static remap_status post_all(const rm_comm *comm, int64_t chunk, int64_t at, int num_ranks, const int *rank,
-                             const int64_t *offset, const void *data, int64_t size, bool is_send, MPI_Request *request, int *num,
-                             int64_t *largest)
+                             const int64_t *offset, const void *data, int64_t size, bool is_send, MPI_Request *request,
+                             int *num, int64_t *largest)
 {
   for (int i = 0; i < num_ranks; i++) {
     message m = message_of(data, size, offset[i], offset[i + 1], rank[i]);
