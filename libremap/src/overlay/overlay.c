@@ -78,28 +78,41 @@ static rm_gid cell_beside(const rm_trimesh *m, const rm_piece *piece, rm_lid t)
   return c >= 0 ? piece->cell_global[c] : -1;
 }
 
-remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
-                              const rm_overlay **out, rm_reason *reason)
+static remap_status overlay(rm_arena *arena, rm_overlay *o, const rm_part *part, bool by_tree, const rm_progress *progress,
+                            rm_reason *reason)
 {
-  rm_overlay *o;
-  rm_lid      bad = 0;
+  rm_lid bad = 0;
 
-  RM_NEW0(o, arena, 1);
-  for (int side = 0; side < 2; side++) o->mesh[side] = mesh[side];
   for (int side = 0; side < 2; side++) {
+    const rm_trimesh  *m = o->mesh[side];
     const remap_status status =
-        rm_trace_build(arena, mesh[side], mesh[1 - side], side == 0 ? 1 : -1, progress, &o->trace[side], &bad);
+        rm_trace_build(arena, m, o->mesh[1 - side], side == 0 ? 1 : -1, by_tree, progress, &o->trace[side], &bad);
     if (status == REMAP_INCONSISTENT)
-      return rm_fail(status, reason, side, cell_beside(mesh[side], &part->piece[side], mesh[side]->star[mesh[side]->star_offset[bad]] / 4),
+      return rm_fail(status, reason, side, cell_beside(m, &part->piece[side], m->star[m->star_offset[bad]] / 4),
                      "an edge of this cell arrives in another cell of the other mesh than its neighbours do; please report both meshes");
     RM_TRY(status);
-    if (o->trace[side].num_crossings > MAX_CROSSINGS)
-      return rm_fail(REMAP_TOO_LARGE, reason, side, -1, "more than 2^30 crossings on one rank; use more ranks");
+    if (o->trace[side].num_crossings > MAX_CROSSINGS) return REMAP_TOO_LARGE;
   }
   RM_TRY(file_ends(arena, o));
   if (!pair_ends(o, (rm_end *)o->end, &bad))
-    return rm_fail(REMAP_INCONSISTENT, reason, REMAP_SOURCE, cell_beside(mesh[0], &part->piece[0], bad),
+    return rm_fail(REMAP_INCONSISTENT, reason, REMAP_SOURCE, cell_beside(o->mesh[0], &part->piece[0], bad),
                    "a face of this cell meets the other mesh in a segment without two ends; please report both meshes");
-  *out = o;
   return REMAP_OK;
+}
+
+/* Walking by adjacency rests on the mesh being embedded where its cells are not flagged. Should a mesh be tangled in a way that the
+ * flags miss, a check fails, and everything is taken from the box tree, which rests on nothing. */
+remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
+                              const rm_overlay **out, rm_reason *reason)
+{
+  rm_overlay  *o;
+  remap_status status;
+
+  RM_NEW0(o, arena, 1);
+  for (int side = 0; side < 2; side++) o->mesh[side] = mesh[side];
+  status = overlay(arena, o, part, false, progress, NULL);
+  if (status == REMAP_INCONSISTENT) status = overlay(arena, o, part, true, progress, reason);
+  if (status == REMAP_TOO_LARGE) return rm_fail(status, reason, -1, -1, "a rank has more entities than it can count; use more ranks");
+  if (status == REMAP_OK) *out = o;
+  return status;
 }

@@ -23,6 +23,7 @@ enum { MAX_LOCAL = 256 };
 typedef struct tracer {
   const rm_trimesh *own, *other;
   int               moved;
+  bool              by_tree; /* every edge */
   rm_arena         *scratch;
   rm_states         states;
   const rm_boxtree *all_tree; /* over all triangles of other; built when first needed */
@@ -326,6 +327,7 @@ static remap_status walk(tracer *t, int dir, rm_lid *state, bool *walked)
 
   t->num_hits = 0;
   *walked     = false;
+  if (t->by_tree) return REMAP_OK;
   for (;;) {
     ahead what;
 
@@ -482,10 +484,10 @@ static remap_status keep(rm_arena *arena, const tracer *t, rm_trace *out)
   return REMAP_OK;
 }
 
-remap_status rm_trace_build(rm_arena *arena, const rm_trimesh *own, const rm_trimesh *other, int moved, const rm_progress *progress,
-                            rm_trace *out, rm_lid *bad_edge)
+remap_status rm_trace_build(rm_arena *arena, const rm_trimesh *own, const rm_trimesh *other, int moved, bool by_tree,
+                            const rm_progress *progress, rm_trace *out, rm_lid *bad_edge)
 {
-  tracer       t = {.own = own, .other = other, .moved = moved, .scratch = rm_arena_new()};
+  tracer       t = {.own = own, .other = other, .moved = moved, .by_tree = by_tree, .scratch = rm_arena_new()};
   remap_status status = t.scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status != REMAP_OK) goto done;

@@ -472,14 +472,19 @@ typedef struct nearness {
   rm_lid            cell;
 } nearness;
 
+/* The skin triangle belongs to a cell that shares no vertex with this one. (Cells that share one which is not pinched are
+ * neighbours in the mesh.) */
 static int is_foreign_skin(void *user, rm_lid s)
 {
-  const nearness   *near = user;
-  const rm_trimesh *m    = near->m;
-  const rm_lid     *v    = m->triangle[m->skin[s]];
+  const nearness   *near  = user;
+  const rm_trimesh *m     = near->m;
+  const rm_lid     *side  = m->side[m->skin[s]];
+  const rm_lid      owner = side[0] >= 0 ? side[0] : side[1];
 
+  if (owner == near->cell) return 0;
   for (rm_lid k = m->cell_vertex_offset[near->cell]; k < m->cell_vertex_offset[near->cell + 1]; k++)
-    if (m->cell_vertex[k] == v[0] || m->cell_vertex[k] == v[1] || m->cell_vertex[k] == v[2]) return 0;
+    for (rm_lid l = m->cell_vertex_offset[owner]; l < m->cell_vertex_offset[owner + 1]; l++)
+      if (m->cell_vertex[k] == m->cell_vertex[l]) return 0;
   return 1;
 }
 
