@@ -86,6 +86,7 @@ void    rc_map_drop(rc_map *map);
 
 /* First of n items that rank r of size ranks owns; r == size gives n. Shares differ by one at most. */
 int64_t rc_share(int64_t n, int rank, int size);
+static inline int64_t rc_clamp(int64_t value, int64_t lo, int64_t hi) { return value < lo ? lo : value > hi ? hi : value; }
 /* The rank that owns item i. */
 int rc_owner(int64_t n, int64_t i, int size);
 

@@ -521,7 +521,6 @@ static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const el
   void         *got  = NULL;
   int64_t       total = 0, num = 0;
 
-  if (status != RCGNS_OK) count = NULL;
   for (int64_t s = 0; s < sets && count; s++)
     if (claim_of(e, j, s, &one)) count[one.key[0] % file->size]++, num++;
   if (!(send = rc_alloc(num, sizeof *send))) status = rc_no_memory(message);
@@ -573,11 +572,6 @@ static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elemen
   return status;
 }
 
-static int64_t clamp(int64_t value, int64_t lo, int64_t hi)
-{
-  return value < lo ? lo : value > hi ? hi : value;
-}
-
 /* Cells [lo, hi) of an unstructured zone. Collective. */
 static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell, rcgns_message *message)
 {
@@ -588,7 +582,7 @@ static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_
   if (zone->by_parents) return rc_poly_build(file, zone, NULL, lo, hi, first_cell, message);
   for (int64_t i = 0; i < zone->num_sections && status == RCGNS_OK; i++) {
     const rc_section *s = zone->section + i;
-    const int64_t     a = clamp(lo - s->first_cell, 0, s->num_cells), b = clamp(hi - s->first_cell, a, s->num_cells);
+    const int64_t     a = rc_clamp(lo - s->first_cell, 0, s->num_cells), b = rc_clamp(hi - s->first_cell, a, s->num_cells);
 
     if (s->is_poly) continue;
     any    = true;
@@ -598,7 +592,7 @@ static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_
   drop_elements(&e);
   for (int64_t i = 0; i < zone->num_sections && status == RCGNS_OK; i++) {
     const rc_section *s = zone->section + i;
-    const int64_t     a = clamp(lo, s->first_cell, s->first_cell + s->num_cells), b = clamp(hi, a, s->first_cell + s->num_cells);
+    const int64_t     a = rc_clamp(lo, s->first_cell, s->first_cell + s->num_cells), b = rc_clamp(hi, a, s->first_cell + s->num_cells);
 
     if (s->is_poly) status = rc_poly_build(file, zone, s, a, b, first_cell + a - lo, message);
   }
@@ -641,7 +635,7 @@ static rcgns_status build_zone(rcgns_file *file, int64_t z, rcgns_message *messa
   const rc_zone *zone  = file->zone + z;
   rc_array      *cells = &file->build.cell_global;
   const int64_t  first = cells->count;
-  const int64_t  lo = clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells), hi = clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
+  const int64_t  lo = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells), hi = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
   rcgns_status   status = RCGNS_OK;
 
   for (int64_t c = lo; c < hi && status == RCGNS_OK; c++)
