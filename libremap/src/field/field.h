@@ -37,7 +37,8 @@ typedef struct rm_transfer_setup {
 } rm_transfer_setup;
 
 /* Transfer num_fields fields; see remap_field in remap.h for the arguments. Collective. Results depend neither on partition nor on
- * numbering. reports may be NULL. Scratch memory lives in arena (the caller drops it). */
+ * numbering. reports may be NULL on some ranks or all; their integrals are over volumes of the own frame. Old values are
+ * read only where a policy keeps them. Scratch memory lives in arena (the caller drops it). */
 remap_status rm_field_transfer(rm_arena *arena, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
                                const remap_field_desc *fields, remap_field_report *reports, rm_reason *reason);
 

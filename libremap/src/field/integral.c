@@ -44,9 +44,8 @@ void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const re
 remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_packing *packing,
                                 rm_integral *integral, remap_field_report *reports)
 {
-  const double unit = setup->frame->scale * setup->frame->scale * setup->frame->scale; /* a power of two */
-  const int    n    = num_fields;
-  rm_sum      *sum  = rm_arena_alloc(scratch, 3 * (int64_t)n, sizeof *sum);
+  const int n   = num_fields;
+  rm_sum   *sum = rm_arena_alloc(scratch, 3 * (int64_t)n, sizeof *sum);
 
   RM_TRY(rm_comm_agree(setup->comm, sum ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(sum);
@@ -60,8 +59,8 @@ remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setu
     const double magnitude = rm_sum_value(&sum[2 * n + f]);
     const double scale     = packing->scale[f];
 
-    reports[f].source_integral = rm_sum_value(&sum[f]) / scale / unit;
-    reports[f].target_integral = (0.0 - rm_sum_value(&sum[n + f])) / scale / unit;
+    reports[f].source_integral = rm_sum_value(&sum[f]) / scale;
+    reports[f].target_integral = (0.0 - rm_sum_value(&sum[n + f])) / scale;
     rm_sum_merge(&sum[f], &sum[n + f]);
     reports[f].conservation_error = magnitude > 0.0 ? fabs(rm_sum_value(&sum[f])) / magnitude : 0.0;
   }
