@@ -36,9 +36,9 @@ static inline void hard_points(random_state *rnd, int kind, double (*p)[3], int 
     for (int k = 0; k < 3; k++) {
       double x = random_unit(rnd) * size;
 
-      if (kind == 1) x = random_below(rnd, 5) - 2;                               /* a tiny grid */
-      if (kind == 2) x = ldexp(x, -random_below(rnd, 101));                      /* any magnitude */
-      if (kind == 3) x = (random_below(rnd, 41) - 20) * 0.1;                     /* a grid that doubles cannot hold */
+      if (kind == 1) x = random_below(rnd, 5) - 2;           /* a tiny grid */
+      if (kind == 2) x = ldexp(x, -random_below(rnd, 101));  /* any magnitude */
+      if (kind == 3) x = (random_below(rnd, 41) - 20) * 0.1; /* a grid that doubles cannot hold */
       if (kind == 4) x = 1000 + floor(x * 0x1p12) * 0x1p-10 + random_unit(rnd) * (random_below(rnd, 2) ? 0 : 0x1p-40); /* far */
       if (kind == 5 && random_below(rnd, 3) == 0) x = 0x1p-57 * random_unit(rnd); /* zero, but for noise */
       p[i][k] = x;

@@ -46,7 +46,7 @@ static bool agrees(const rm_int *a, const mpz_t want)
 
 static void sums_and_products_agree_with_gmp(void)
 {
-  random_state rnd = {21};
+  random_state rnd   = {21};
   int          wrong = 0;
   rm_int       a, b, r;
   mpz_t        x, y, z;
@@ -80,7 +80,7 @@ static void sums_and_products_agree_with_gmp(void)
 
 static void coordinates_are_integers_at_their_scale(void)
 {
-  random_state rnd = {22};
+  random_state rnd   = {22};
   int          wrong = 0;
   rm_int       a;
   mpz_t        z;
@@ -117,7 +117,7 @@ static void coordinates_are_integers_at_their_scale(void)
 
 static void quotients_are_rounded_to_doubles(void)
 {
-  random_state rnd = {23};
+  random_state rnd   = {23};
   int          wrong = 0;
   rm_int       a, b;
   mpq_t        q, got;

@@ -71,10 +71,10 @@ static void crossings_come_in_the_order_of_rationals_and_their_derivatives(void)
     int       want;
 
     hard_points(&rnd, round / 2 % NUM_KINDS, p, 8);
-    if (random_below(&rnd, 3) == 0) memcpy(p[5], p[2], sizeof *p);                               /* planes that share a vertex, */
+    if (random_below(&rnd, 3) == 0) memcpy(p[5], p[2], sizeof *p); /* planes that share a vertex, */
     if (random_below(&rnd, 3) == 0) memcpy(p[5], p[2], sizeof *p), memcpy(p[7], p[3], sizeof *p); /* an edge, */
-    if (random_below(&rnd, 6) == 0) memcpy(p[6], p[4], sizeof *p);                               /* or all there is */
-    if (random_below(&rnd, 6) == 0) memcpy(p[0], p[2 + random_below(&rnd, 3)], sizeof *p);        /* the line starts in a vertex */
+    if (random_below(&rnd, 6) == 0) memcpy(p[6], p[4], sizeof *p);                                /* or all there is */
+    if (random_below(&rnd, 6) == 0) memcpy(p[0], p[2 + random_below(&rnd, 3)], sizeof *p); /* the line starts in a vertex */
     if (!locate(&a, p[0], p[1], p + 2, moved) || !locate(&b, p[0], p[1], p + 5, moved)) continue;
     want = order_of(&a, &b);
     wrong += library_order(p, p + 2, p + 5, moved) != want;
@@ -123,7 +123,7 @@ static void parameters_are_accurate_and_stay_on_the_edge(void)
 
 static void an_edge_that_ends_in_a_corner_is_crossed_at_its_very_end(void)
 {
-  random_state rnd = {13};
+  random_state rnd   = {13};
   int          wrong = 0;
   double       p[5][3];
 
@@ -137,4 +137,5 @@ static void an_edge_that_ends_in_a_corner_is_crossed_at_its_very_end(void)
 }
 
 RT_MAIN(RT_CASE(crossings_come_in_the_order_of_rationals_and_their_derivatives),
-        RT_CASE(parameters_are_accurate_and_stay_on_the_edge), RT_CASE(an_edge_that_ends_in_a_corner_is_crossed_at_its_very_end))
+        RT_CASE(parameters_are_accurate_and_stay_on_the_edge),
+        RT_CASE(an_edge_that_ends_in_a_corner_is_crossed_at_its_very_end))

@@ -10,20 +10,14 @@ enum { ROUNDS = 40000 };
 static rational3 u, v, w, normal;
 static mpq_t     det;
 
-static void begin(void)
-{
-  r3_init(&u), r3_init(&v), r3_init(&w), r3_init(&normal), mpq_init(det);
-}
-static void end(void)
-{
-  r3_clear(&u), r3_clear(&v), r3_clear(&w), r3_clear(&normal), mpq_clear(det);
-}
+static void begin(void) { r3_init(&u), r3_init(&v), r3_init(&w), r3_init(&normal), mpq_init(det); }
+static void end(void) { r3_clear(&u), r3_clear(&v), r3_clear(&w), r3_clear(&normal), mpq_clear(det); }
 
 static void compiled_arithmetic_is_exact_where_it_must_be(void) { RT_CHECK(rm_geom_selftest()); }
 
 static void orientation_agrees_with_rationals(void)
 {
-  random_state rnd = {1};
+  random_state rnd   = {1};
   int          wrong = 0, zeros = 0;
   double       p[4][3];
 
@@ -45,7 +39,7 @@ static void orientation_agrees_with_rationals(void)
 
 static void point_sides_agree_with_rationals_and_their_derivatives(void)
 {
-  random_state rnd = {2};
+  random_state rnd   = {2};
   int          wrong = 0, zeros = 0, flat = 0;
   double       p[4][3];
 
@@ -74,7 +68,7 @@ static void point_sides_agree_with_rationals_and_their_derivatives(void)
 
 static void edge_sides_agree_with_rationals_and_their_derivatives(void)
 {
-  random_state rnd = {3};
+  random_state rnd   = {3};
   int          wrong = 0, zeros = 0, parallel = 0;
   double       p[4][3];
 
@@ -85,7 +79,12 @@ static void edge_sides_agree_with_rationals_and_their_derivatives(void)
     int       want;
 
     hard_points(&rnd, round / 2 % NUM_KINDS, p, 4);
-    if (random_below(&rnd, 10) == 0) memcpy(p[2 + (round >> 1 & 1)], p[0], sizeof *p), memcpy(p[3 - (round >> 1 & 1)], p[1], sizeof *p);
+    if (random_below(&rnd, 10) == 0) { /* the same edge, either way round */
+      const int way = random_below(&rnd, 2);
+
+      memcpy(p[2 + way], p[0], sizeof *p);
+      memcpy(p[3 - way], p[1], sizeof *p);
+    }
     r3_between(&u, p[0], p[1]);
     r3_between(&v, p[2], p[3]);
     r3_between(&w, p[0], p[2]);
@@ -106,7 +105,7 @@ static void edge_sides_agree_with_rationals_and_their_derivatives(void)
 /* Both signs of one geometric question are asked of different operands: they may not contradict each other. */
 static void an_edge_that_runs_inside_three_edges_crosses_their_triangle(void)
 {
-  random_state rnd = {4};
+  random_state rnd            = {4};
   int          contradictions = 0, crossed = 0;
   double       p[5][3];
 
@@ -128,7 +127,7 @@ static void an_edge_that_runs_inside_three_edges_crosses_their_triangle(void)
 
 static void determinants_in_double_double_keep_their_bound(void)
 {
-  random_state rnd = {5};
+  random_state rnd   = {5};
   int          wrong = 0;
   mpq_t        term, sum;
   double       p[4][3];

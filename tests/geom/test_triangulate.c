@@ -89,13 +89,16 @@ static int boundary_of_loop(double (*xyz)[3], int n, const double *a, const doub
   return times;
 }
 
-/* True if the triangles' boundary is the loop: no edge more, none less. */
+/* True if the triangles' boundary is the loop, no edge more, none less, and no triangle has a corner twice. */
 static bool fits_loop(double (*xyz)[3], int n, const result *r)
 {
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++)
       if (!same_point(xyz[i], xyz[j]) && boundary_of_triangles(r, xyz[i], xyz[j]) != boundary_of_loop(xyz, n, xyz[i], xyz[j]))
         return false;
+  for (int t = 0; t < r->num; t++)
+    for (int k = 0; k < 3; k++)
+      if (same_point(corner_of(r, t, k), corner_of(r, t, (k + 1) % 3))) return false;
   for (int i = 0; i < n && uses_centre(r); i++)
     if (!same_point(r->centre, xyz[i]) && boundary_of_triangles(r, r->centre, xyz[i]) != 0) return false;
   return true;
@@ -174,7 +177,7 @@ static int any_polygon(random_state *rnd, double (*xyz)[3])
 
 static void triangles_depend_on_neither_start_nor_direction_of_the_loop(void)
 {
-  random_state rnd = {31};
+  random_state rnd       = {31};
   int          different = 0;
   double       xyz[MAX_N][3], other[MAX_N][3];
   result       a, b;
@@ -195,7 +198,7 @@ static void triangles_depend_on_neither_start_nor_direction_of_the_loop(void)
 
 static void the_boundary_of_the_triangles_is_the_loop(void)
 {
-  random_state rnd = {32};
+  random_state rnd  = {32};
   int          open = 0, too_many = 0, centres = 0, parts = 0;
   double       xyz[MAX_N][3];
   result       r;
@@ -216,7 +219,7 @@ static void the_boundary_of_the_triangles_is_the_loop(void)
 
 static void flat_faces_take_two_triangles_less_than_vertices_and_cover_them_once(void)
 {
-  random_state rnd = {33};
+  random_state rnd   = {33};
   int          wrong = 0;
   double       xyz[MAX_N][3];
   result       r;
@@ -251,7 +254,7 @@ static void flat_faces_take_two_triangles_less_than_vertices_and_cover_them_once
 
 static void warped_faces_are_fans_about_their_mean(void)
 {
-  random_state rnd = {34};
+  random_state rnd   = {34};
   int          wrong = 0, quads = 0;
   double       xyz[MAX_N][3];
   result       r;
@@ -261,7 +264,8 @@ static void warped_faces_are_fans_about_their_mean(void)
 
     triangulate(xyz, n, REMAP_FACES_CENTRE, &r);
     wrong += r.num != (n == 3 ? 1 : n) || uses_centre(&r) != (n > 3);
-    for (int t = 0; t < r.num && n > 3; t++) wrong += r.corner[3 * t + 2] != RM_CENTRE_POINT && r.corner[3 * t + 1] != RM_CENTRE_POINT;
+    for (int t = 0; t < r.num && n > 3; t++)
+      wrong += r.corner[3 * t + 2] != RM_CENTRE_POINT && r.corner[3 * t + 1] != RM_CENTRE_POINT;
     for (int k = 0; k < 3 && n > 3; k++) {
       double mean = 0;
 
@@ -369,7 +373,8 @@ static void faces_without_area_are_covered_by_triangles_without_area(void)
     }
 }
 
-RT_MAIN(RT_CASE(triangles_depend_on_neither_start_nor_direction_of_the_loop), RT_CASE(the_boundary_of_the_triangles_is_the_loop),
+RT_MAIN(RT_CASE(triangles_depend_on_neither_start_nor_direction_of_the_loop),
+        RT_CASE(the_boundary_of_the_triangles_is_the_loop),
         RT_CASE(flat_faces_take_two_triangles_less_than_vertices_and_cover_them_once),
         RT_CASE(warped_faces_are_fans_about_their_mean), RT_CASE(a_quadrangle_is_cut_along_its_shorter_diagonal),
         RT_CASE(a_concave_quadrangle_is_cut_inside), RT_CASE(hanging_vertices_stay_corners_and_lie_on_no_diagonal),

@@ -17,9 +17,9 @@
 enum { RM_INT_LIMBS = 66, RM_INT_BITS = 64 * RM_INT_LIMBS, RM_INT_SCALE = 152 };
 
 typedef struct rm_int {
-  int      sign;                /* -1, 0, +1                                              */
-  int      num_limbs;           /* in use; the last one is not zero; 0 exactly if sign is */
-  uint64_t limb[RM_INT_LIMBS];  /* magnitude, least significant first                     */
+  int      sign;               /* -1, 0, +1                                              */
+  int      num_limbs;          /* in use; the last one is not zero; 0 exactly if sign is */
+  uint64_t limb[RM_INT_LIMBS]; /* magnitude, least significant first                     */
 } rm_int;
 
 /* The smallest scale at which every coordinate of num points is an integer. RM_INT_SCALE is one for all admitted coordinates. */

@@ -53,8 +53,8 @@ enum { RM_CENTRE_POINT = -1 }; /* stands for the mean of the face's vertices in 
  * work is scratch of at least 4 n ints. Returns the number of triangles, 0 if no part of 3 vertices is left.
  * Triangle: itself. Exactly coplanar face, or faces == DIAGONAL: as few triangles as possible, shorter diagonal first, ties by
  * coordinates, ears cut off in canonical order where the polygon is concave. CENTRE: fan about the mean, summed in canonical
- * order; if one triangle of the fan runs against the face's area vector, ears as above; if no ear is left, a fan from the
- * canonical first vertex. O(n^2) worst case, O(n) for quadrangles and fans. */
+ * order; if one triangle of the fan runs against the face's area vector or the mean is a vertex, ears as above; if no ear is
+ * left, a fan from the canonical first vertex. O(n^2) worst case, O(n) for quadrangles; no triangle has a corner twice. */
 int rm_triangulate(const double (*xyz)[3], int n, remap_faces faces, int *corner, double centre[3], int *work);
 
 /* ---- double-double ------------------------------------------------------------------------------------------------ */

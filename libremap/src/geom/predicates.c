@@ -4,7 +4,7 @@
  *   1. the determinant in doubles against its rounding error bound (Shewchuk 1997, stage A): 4 ns;
  *   2. exact zeros for free: every product is zero (a shared point, points in an axis-parallel plane; nothing underflows, see
  *      below), or two of the points coincide: 4-6 ns;
- *   3. integers of 64 and 128 bits, if the coordinates are multiples of 2^-61 of the largest of them, as nearly all are: 30 ns;
+ *   3. integers of 64 and 128 bits (grid.h), if the coordinates share a grid, as nearly all do: 30 ns;
  *   4. the determinant in double-double against its bound (3x3 only): 30 ns;
  *   5. integers of any length (exact.h): 300 ns.
  *
@@ -13,77 +13,26 @@
 #include "geom/exact.h"
 #include "geom/expansion.h"
 #include "geom/geom_private.h"
-
-#include <math.h>
-#include <string.h>
-
-__extension__ typedef __int128 int128;
-
-enum { GRID_BITS = 61 };
+#include "geom/grid.h"
 
 /* Rounding error bounds, relative to the sum of absolute terms. */
 static const double CROSS_ERROR  = (3 + 16 * RM_EPSILON) * RM_EPSILON;
 static const double DET_ERROR    = (7 + 56 * RM_EPSILON) * RM_EPSILON;
 static const double DET_ERROR_DD = 0x1p-95;
 
-/* ---- stage 3: coordinates as integers below 2^GRID_BITS ----------------------------------------------------------- */
+/* ---- 3x3 ---------------------------------------------------------------------------------------------------------- */
 
-/* The power of two that brings values up to largest > 0 below 2^GRID_BITS. */
-static double grid_scale(double largest)
-{
-  uint64_t bits;
-  double   scale;
-
-  memcpy(&bits, &largest, sizeof bits);
-  bits = (uint64_t)(GRID_BITS + 1022 + 1023 - (int)(bits >> 52)) << 52;
-  memcpy(&scale, &bits, sizeof scale);
-  return scale;
-}
-
-/* The num coordinates x[] as integers in units of their own; false if their last bits are too far below the largest. */
-static inline bool to_grid(int num, const double x[], int64_t out[])
-{
-  double largest = 0, scale;
-  bool   exact = true;
-
-  for (int k = 0; k < num; k++) largest = fabs(x[k]) > largest ? fabs(x[k]) : largest;
-  if (largest == 0) largest = 1;
-  scale = grid_scale(largest);
-  for (int k = 0; k < num; k++) {
-    const double y = x[k] * scale;
-
-    out[k] = (int64_t)y;
-    exact &= (double)out[k] == y;
-  }
-  return exact;
-}
-
-/* a1 b2 - a2 b1; factors below 2^62. */
-static inline int128 grid_minor(int64_t a1, int64_t a2, int64_t b1, int64_t b2) { return (int128)a1 * b2 - (int128)a2 * b1; }
-
-/* Sign of det[a - o, b - o, c - o], grid = o, a, b, c. Differences are below 2^62, minors below 2^125; each minor is cut
- * into high * 2^62 + low, 0 <= low < 2^62, so that both sums of products stay below 2^127. */
+/* Stage 3, grid = o, a, b, c. */
 static int grid_det_sign(const int64_t grid[12])
 {
-  const int64_t low_mask = (INT64_C(1) << 62) - 1;
-  int64_t       d[3][3];
-  int128        high = 0, low = 0;
+  int64_t   d[3][3];
+  rm_int128 normal[3];
 
   for (int r = 0; r < 3; r++)
     for (int k = 0; k < 3; k++) d[r][k] = grid[3 * r + 3 + k] - grid[k];
-  for (int k = 0; k < 3; k++) {
-    const int    i = (k + 1) % 3, j = (k + 2) % 3;
-    const int128 minor = grid_minor(d[1][i], d[1][j], d[2][i], d[2][j]);
-
-    high += (minor >> 62) * d[0][k]; /* the shift rounds down, as gcc and clang define it */
-    low += (minor & low_mask) * d[0][k];
-  }
-  high += low >> 62;
-  low &= low_mask;
-  return high ? (high > 0 ? 1 : -1) : low > 0;
+  rm_grid_cross(d[1], d[2], normal);
+  return rm_grid_sign(rm_grid_dot(normal, d[0]));
 }
-
-/* ---- 3x3 ---------------------------------------------------------------------------------------------------------- */
 
 /* The last stage. */
 static int exact_det_sign(const double o[3], const double a[3], const double b[3], const double c[3])
@@ -107,7 +56,7 @@ static __attribute__((noinline)) int close_det_sign(const double o[3], const dou
   int64_t      grid[12];
 
   if (rm_same_point(a, b) || rm_same_point(b, c) || rm_same_point(a, c)) return 0;
-  if (to_grid(12, xyz, grid)) return grid_det_sign(grid);
+  if (rm_to_grid(12, xyz, grid)) return grid_det_sign(grid);
   const rm_dd det = rm_det_dd(o, a, b, c);
   return fabs(det.hi) > DET_ERROR_DD * permanent ? rm_sign(det.hi) : exact_det_sign(o, a, b, c);
 }
@@ -151,8 +100,8 @@ static __attribute__((noinline)) int close_cross_sign(const double x[8])
 {
   int64_t grid[8];
 
-  if (!to_grid(8, x, grid)) return exact_cross_sign(x);
-  const int128 minor = grid_minor(grid[2] - grid[0], grid[3] - grid[1], grid[6] - grid[4], grid[7] - grid[5]);
+  if (!rm_to_grid(8, x, grid)) return exact_cross_sign(x);
+  const rm_int128 minor = rm_grid_minor(grid[2] - grid[0], grid[3] - grid[1], grid[6] - grid[4], grid[7] - grid[5]);
   return (minor > 0) - (minor < 0);
 }
 

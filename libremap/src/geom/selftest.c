@@ -32,8 +32,8 @@ static bool transformations_are_exact(void)
   const rm_dd  product = rm_two_product(x, y), sum = rm_two_sum(tiny, x), diff = rm_two_diff(x, tiny);
   const rm_dd  square = rm_two_product(third, third);
 
-  return product.hi == 1 && product.lo == -0x1p-60 && sum.hi == x && sum.lo == 0x1p-100 && diff.hi == x && diff.lo == -0x1p-100 &&
-         square.hi == 0x1.c71c71c71c71cp-4 && square.lo == -0x1.c71c71c71c71cp-58;
+  return product.hi == 1 && product.lo == -0x1p-60 && sum.hi == x && sum.lo == 0x1p-100 && diff.hi == x &&
+         diff.lo == -0x1p-100 && square.hi == 0x1.c71c71c71c71cp-4 && square.lo == -0x1.c71c71c71c71cp-58;
 }
 
 bool rm_geom_selftest(void) { return rounds_to_nearest() && products_are_rounded() && transformations_are_exact(); }

@@ -143,7 +143,7 @@ static void cut_ears(sink *out, int *part, int n, int *ear)
  * diagonal, which is what cut_ears() would find. */
 static void fewest_triangles(sink *out, int *part, int n, int *ear)
 {
-  const double (*xyz)[3] = out->xyz;
+  const double(*xyz)[3] = out->xyz;
 
   if (n == 4) {
     const view v       = view_of(xyz, part, 4);
@@ -170,12 +170,12 @@ typedef struct face_parts {
   int *size;       /* [num], none below 3              */
 } face_parts;
 
-/* A fan about the mean of the vertices, unless one of its triangles runs against the area vector. */
+/* A fan about the mean of the vertices, unless one of its triangles runs against the area vector or the mean is a vertex. */
 static bool fan(sink *out, const face_parts *face, double centre[3])
 {
-  const double (*xyz)[3] = out->xyz;
-  const int first        = out->num;
-  double    area[3]      = {0, 0, 0}, sum[3] = {0, 0, 0};
+  const double(*xyz)[3] = out->xyz;
+  const int first       = out->num;
+  double    area[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
 
   for (int i = 0; i < face->total; i++)
     for (int k = 0; k < 3; k++) sum[k] += xyz[face->vertex[i]][k];
@@ -192,7 +192,7 @@ static bool fan(sink *out, const face_parts *face, double centre[3])
       double    normal[3] = {0, 0, 0};
 
       add_normal(xyz[a], xyz[b], centre, normal);
-      if (normal[0] * area[0] + normal[1] * area[1] + normal[2] * area[2] < 0) {
+      if (normal[0] * area[0] + normal[1] * area[1] + normal[2] * area[2] < 0 || rm_same_point(xyz[a], centre)) {
         out->num = first;
         return false;
       }
@@ -221,7 +221,8 @@ static inline int triangulate_parts(sink *out, const face_parts *face, remap_fac
   if (face->num == 1 && face->total == 3) {
     emit(out, face->vertex[0], face->vertex[1], face->vertex[2]);
   } else if (faces == REMAP_FACES_DIAGONAL || coplanar(out->xyz, face->vertex, face->total) || !fan(out, face, centre)) {
-    for (int p = 0, from = 0; p < face->num; from += face->size[p++]) fewest_triangles(out, face->vertex + from, face->size[p], ear);
+    for (int p = 0, from = 0; p < face->num; from += face->size[p++])
+      fewest_triangles(out, face->vertex + from, face->size[p], ear);
   }
   return out->num;
 }
@@ -337,7 +338,7 @@ static int triangulate_polygon(sink *out, int n, remap_faces faces, double centr
  * is repeated. */
 static inline int triangulate_small(sink *out, int n, remap_faces faces, double centre[3])
 {
-  const double (*xyz)[3] = out->xyz;
+  const double(*xyz)[3] = out->xyz;
   int vertex[4], ear[4], smallest = 0;
 
   for (int i = 0; i < n; i++)
