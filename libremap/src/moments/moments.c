@@ -423,45 +423,64 @@ static bool has_area(const work *w, rm_lid i, const slot *s, const polygon *g)
   return fabs(g->area) > 0x1p-47 * (g->num_cones + 1) * s->reach * operand_extent(w, i, s) * length;
 }
 
-static bool coplanar(const work *w, const polygon *g, const polygon *h)
+static bool coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
 {
-  const rm_trimesh *m = w->o->mesh[g->mesh], *k = w->o->mesh[h->mesh];
-  const rm_lid     *a = m->triangle[g->triangle], *b = k->triangle[h->triangle];
+  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
+  const rm_lid     *v = m->triangle[a];
 
   for (int c = 0; c < 3; c++)
-    if (rm_orient3d(m->vertex[a[0]], m->vertex[a[1]], m->vertex[a[2]], k->vertex[b[c]]) != 0) return false;
+    if (rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], k->vertex[k->triangle[b][c]]) != 0) return false;
   return true;
 }
 
-/* +1 if the normals out of the two cells point the same way, -1 if opposite; for coplanar triangles. */
-static int facing(const work *w, rm_lid i, rm_lid j, const polygon *g, const polygon *h)
+/* +1 if the normals of triangles a and b out of their cells, cell[mesh], point the same way, -1 if opposite; for coplanar ones. */
+static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int mesh_b, rm_lid b)
 {
-  const rm_trimesh *m = w->o->mesh[g->mesh], *k = w->o->mesh[h->mesh];
-  const double     *a = m->normal[g->triangle], *b = k->normal[h->triangle];
-  const rm_lid      cell_g = g->mesh ? j : i, cell_h = h->mesh ? j : i;
-  const bool        flip = (m->side[g->triangle][0] == cell_g) != (k->side[h->triangle][0] == cell_h);
-  const double      d = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
+  const double     *n = m->normal[a], *o = k->normal[b];
+  const bool        flip = (m->side[a][0] == cell[mesh_a]) != (k->side[b][0] == cell[mesh_b]);
 
-  return (d > 0) != flip ? 1 : -1;
+  return (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] > 0) != flip ? 1 : -1;
 }
 
-/* Every polygon of the pair that has area meets an exactly coplanar one of the other cell that faces the same way (want = 1) or
- * the opposite way (-1). skin: 0 asks all polygons, else only those in the skin of mesh skin - 1. */
-static bool all_partnered(const work *w, rm_lid i, const slot *s, int want, int skin)
+/* The polygons of the pair cancel: each one that has area meets an exactly coplanar one that has area and faces the other way. */
+static bool polygons_cancel(const work *w, rm_lid i, const slot *s)
 {
+  const rm_lid cell[2] = {i, s->target};
+
   for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next) {
     const polygon *g = &w->polygon[k];
-    bool           found = false;
+    bool           found = !has_area(w, i, s, g);
 
-    if (skin && (g->mesh != skin - 1 || !w->o->mesh[g->mesh]->triangle_is_skin[g->triangle])) continue;
-    if (!has_area(w, i, s, g)) continue;
     for (int l = s->first_polygon; l >= 0 && !found; l = w->polygon[l].next) {
       const polygon *h = &w->polygon[l];
-      found = h->mesh != g->mesh && has_area(w, i, s, h) && coplanar(w, g, h) && facing(w, i, s->target, g, h) == want;
+      found = l != k && has_area(w, i, s, h) && coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle) &&
+              facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0;
     }
     if (!found) return false;
   }
   return true;
+}
+
+/* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons has area and does not lie in a face of
+ * that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not.) */
+static bool skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
+{
+  const rm_lid      cell[2] = {i, s->target};
+  const rm_trimesh *other = w->o->mesh[1 - mesh];
+
+  for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next) {
+    const polygon *g = &w->polygon[k];
+    bool           found = false;
+
+    if (g->mesh != mesh || !w->o->mesh[mesh]->triangle_is_skin[g->triangle] || !has_area(w, i, s, g)) continue;
+    for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1] && !found; a++) {
+      const rm_lid b = other->cell_triangle[a] / 2;
+      found = coplanar(w, mesh, g->triangle, 1 - mesh, b) && facing(w, cell, mesh, g->triangle, 1 - mesh, b) > 0;
+    }
+    if (!found) return true;
+  }
+  return false;
 }
 
 /* ---- one source cell ------------------------------------------------------------------------------------------------- */
@@ -534,9 +553,9 @@ static remap_status finish_cell(work *w, rm_lid i)
 
     w->slot_of[s->target] = -1;
     if (s->first_polygon != NO_POLYGONS) {
-      if (fabs(s->sum[0]) <= volume_noise(w, i, s) && all_partnered(w, i, s, -1, 0)) continue;
-      if (s->kinds & SKIN_SOURCE && !all_partnered(w, i, s, 1, 1)) flags |= RM_PAIR_SOURCE_SKIN;
-      if (s->kinds & SKIN_TARGET && !all_partnered(w, i, s, 1, 2)) flags |= RM_PAIR_TARGET_SKIN;
+      if (fabs(s->sum[0]) <= volume_noise(w, i, s) && polygons_cancel(w, i, s)) continue;
+      if (s->kinds & SKIN_SOURCE && skin_passes(w, i, s, 0)) flags |= RM_PAIR_SOURCE_SKIN;
+      if (s->kinds & SKIN_TARGET && skin_passes(w, i, s, 1)) flags |= RM_PAIR_TARGET_SKIN;
     }
     RM_TRY(push_pair(w, i, s, flags));
   }
