@@ -53,7 +53,7 @@ static void open_world(world *w, int kind, int deal)
 
 static void for_all_worlds(void (*check)(world *w))
 {
-  for (int kind = 0; kind < PAIRS_NUM_KINDS; kind++)
+  for (int kind = 0; kind < pairs_num_kinds(); kind++)
     for (int deal = 0; deal < PAIRS_NUM_DEALS; deal++) {
       world w;
 
@@ -283,6 +283,32 @@ static void equal_grids_are_shared_out_evenly(void)
   }
 }
 
+/* Pairs of cells on this rank whose boxes meet. */
+static int64_t count_pairs(const world *w)
+{
+  const rm_piece *src_piece = &w->part->piece[REMAP_SOURCE], *dst_piece = &w->part->piece[REMAP_TARGET];
+  const whole    *src = &w->all[REMAP_SOURCE], *dst = &w->all[REMAP_TARGET];
+  int64_t         num = 0;
+
+  for (rm_lid i = 0; i < src_piece->num_cells; i++)
+    for (rm_lid j = 0; j < dst_piece->num_cells; j++)
+      num += rm_box_meets(src->box[whole_number(src, src_piece, i)], dst->box[whole_number(dst, dst_piece, j)]);
+  return num;
+}
+
+static void pairs_are_shared_out_evenly_though_one_grid_is_refined_in_a_corner(void)
+{
+  world   w;
+  int64_t most, sum;
+
+  open_world(&w, PAIRS_GRADED, TM_SLABS);
+  most = sum = count_pairs(&w);
+  RT_EQ(rm_comm_max_i64(&w.in.comm, &most, 1), REMAP_OK);
+  RT_EQ(rm_comm_sum_i64(&w.in.comm, &sum, 1), REMAP_OK);
+  RT_CHECK((double)most * w.in.comm.size <= 1.5 * (double)sum);
+  pairs_close(&w.in);
+}
+
 /* The rank of every target by its global id, which is dense in these meshes. */
 static int64_t *rank_of_target(world *w)
 {
@@ -428,7 +454,9 @@ RT_MAIN(RT_CASE(every_invariant_holds), RT_CASE(every_target_of_the_zone_and_no_
         RT_CASE(every_pair_of_cells_with_meeting_boxes_is_on_one_rank), RT_CASE(cells_carry_their_home_id_volume_and_centroid),
         RT_CASE(the_faces_of_every_cell_enclose_its_volume_and_point_outward),
         RT_CASE(skin_stays_skin_and_cut_faces_do_not_become_it), RT_CASE(the_targets_of_a_rank_are_an_interval_of_keys),
-        RT_CASE(equal_grids_are_shared_out_evenly), RT_CASE(the_cut_does_not_depend_on_who_hands_in_what),
+        RT_CASE(equal_grids_are_shared_out_evenly),
+        RT_CASE(pairs_are_shared_out_evenly_though_one_grid_is_refined_in_a_corner),
+        RT_CASE(the_cut_does_not_depend_on_who_hands_in_what),
         RT_CASE(meshes_apart_leave_every_rank_with_empty_pieces),
         RT_CASE(the_check_sees_a_face_that_is_turned_missing_or_beside_no_cell),
         RT_CASE(all_ranks_fail_alike_when_one_is_out_of_memory_for_the_product),

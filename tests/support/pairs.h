@@ -23,7 +23,8 @@ typedef enum pairs_kind {
   PAIRS_TOUCHING,      /* two grids that share one plane                                 */
   PAIRS_APART,         /* two grids that do not meet                                     */
   PAIRS_NO_SOURCE,     /* a source without cells                                         */
-  PAIRS_NUM_KINDS
+  PAIRS_GRADED,        /* a grid that is refined towards a corner, and an even one       */
+  PAIRS_DRAWN          /* and beyond: PAIRS_DRAWN + k is the k-th pair drawn by lot      */
 } pairs_kind;
 
 enum { PAIRS_NUM_DEALS = TM_LAST + 1 }; /* the ways of tm_dealing */
@@ -43,9 +44,41 @@ static inline void pairs_place_(double xyz[3], const void *data)
   for (int d = 0; d < 3; d++) xyz[d] = m[0] * xyz[d] + m[1 + d];
 }
 
+/* Crowd the unit cube's points towards the origin. */
+static inline void pairs_grade_(double xyz[3], const void *data)
+{
+  const double power = *(const double *)data;
+
+  for (int d = 0; d < 3; d++) xyz[d] = pow(xyz[d], power);
+}
+
 static inline tm_mesh *pairs_grid_(int n, double scale, double shift)
 {
   return tm_hexahedra((int[]){n, n, n}, pairs_place_, (double[]){scale, shift, 0.0, 0.0});
+}
+
+static inline tm_mesh *pairs_checkered_(const int n[3], tm_map map, const void *data)
+{
+  return tm_refined(n, tm_checkered, map, data);
+}
+
+/* A small mesh of any maker, distorted, and moved by up to the cube's edge. */
+static inline tm_mesh *pairs_draw_(uint64_t seed)
+{
+  static tm_mesh *(*const maker[])(const int n[3], tm_map map, const void *data) = {
+      tm_hexahedra, tm_tetrahedra, tm_prisms, tm_pyramids, tm_mixed, pairs_checkered_, tm_dual};
+  const int64_t num = (int64_t)(sizeof maker / sizeof *maker), steps = 1000;
+  uint64_t      state = tm_mix_(seed);
+  double        map[12];
+  int           n[3];
+
+  for (int d = 0; d < 3; d++) n[d] = 1 + (int)tm_random(&state, 4);
+  for (int i = 0; i < 12; i++) {
+    const double drawn = 2.0 * (double)tm_random(&state, steps) / (double)steps - 1.0;
+
+    map[i] = i % 4 == 3 ? drawn : (i % 5 == 0) + 0.3 * drawn; /* the linear part stays right-handed */
+  }
+  return maker[tm_random(&state, num)](n, tm_affine, map);
 }
 
 /* The whole mesh of one side; NULL if it has no cells. */
@@ -54,6 +87,7 @@ static inline tm_mesh *pairs_whole_(pairs_kind kind, int side)
   const bool source = side == REMAP_SOURCE;
   tm_mesh   *mesh;
 
+  if (kind >= PAIRS_DRAWN) return pairs_draw_(2 * (uint64_t)(kind - PAIRS_DRAWN) + (uint64_t)side);
   switch (kind) {
     case PAIRS_WARPED:
       return source ? tm_hexahedra((int[]){5, 6, 7}, tm_warp, &(tm_warping){0.03, 0.7})
@@ -68,6 +102,8 @@ static inline tm_mesh *pairs_whole_(pairs_kind kind, int side)
     case PAIRS_TOUCHING: return source ? pairs_grid_(5, 1.0, 0.0) : pairs_grid_(4, 1.0, 1.0);
     case PAIRS_APART: return source ? pairs_grid_(5, 1.0, 0.0) : pairs_grid_(4, 1.0, 3.0);
     case PAIRS_NO_SOURCE: return source ? NULL : pairs_grid_(4, 1.0, 0.0);
+    case PAIRS_GRADED:
+      return source ? tm_hexahedra((int[]){12, 12, 12}, pairs_grade_, &(double){3.0}) : pairs_grid_(10, 1.0, 0.0);
     default: return pairs_grid_(7, 1.0, 0.0);
   }
 }
@@ -81,6 +117,9 @@ static inline tm_mesh *pairs_part_(const tm_mesh *whole, tm_dealing deal)
   free(rank);
   return part;
 }
+
+/* How many kinds a test goes through, from 0 on. */
+static inline int pairs_num_kinds(void) { return PAIRS_DRAWN + (rt_long() ? 500 : 10); }
 
 static inline void pairs_open(pairs_world *world, pairs_kind kind, tm_dealing deal)
 {

@@ -5,7 +5,7 @@
 
 static void for_all_worlds(void (*check)(const pairs_world *w, const rm_zone *zone))
 {
-  for (int kind = 0; kind < PAIRS_NUM_KINDS; kind++)
+  for (int kind = 0; kind < pairs_num_kinds(); kind++)
     for (int deal = 0; deal < PAIRS_NUM_DEALS; deal++) {
       pairs_world    w;
       const rm_zone *zone = NULL;
@@ -113,7 +113,7 @@ static void grids_that_share_a_plane_list_one_layer_each(void)
 
 static void grids_apart_and_a_mesh_without_cells_list_nothing(void)
 {
-  static const pairs_kind kinds[] = {PAIRS_APART, PAIRS_NO_SOURCE};
+  static const pairs_kind kinds[2] = {PAIRS_APART, PAIRS_NO_SOURCE};
 
   for (int k = 0; k < 2; k++) {
     pairs_world w;
