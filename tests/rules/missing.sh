@@ -27,7 +27,7 @@ without() {
   echo "without $2: says so"
 }
 without '^set\(MPI' 'libopenmpi-dev openmpi-bin' -DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON
-without 'gmp' libgmp-dev -DREMAP_TESTS=ON
+without 'gmp' libgmp-dev -DREMAP_CGNS=OFF
 if grep -q remap_dep__hdf5 "$work/found.cmake"; then
   without 'hdf5' libhdf5-openmpi-dev -DREMAP_CGNS=ON
   without 'cgns' libcgns-dev -DREMAP_CGNS=ON
