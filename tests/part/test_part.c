@@ -1,5 +1,5 @@
-/* What part hands to the overlay, against brute force over all cells of both meshes: small meshes of several kinds, handed in in
- * several ways. */
+/* What part hands to the overlay, against brute force over all cells of both meshes: small meshes of several kinds, handed in
+ * in several ways. */
 #include "part/part_private.h"
 #include "pairs.h"
 #include "rt.h"

@@ -195,7 +195,8 @@ static void a_failed_allocation_is_reported_wherever_it_happens(void)
   free(box);
 }
 
-RT_MAIN(RT_CASE(every_item_is_in_one_leaf_and_every_box_holds_its_parts), RT_CASE(a_query_visits_what_brute_force_finds_once_each),
+RT_MAIN(RT_CASE(every_item_is_in_one_leaf_and_every_box_holds_its_parts),
+        RT_CASE(a_query_visits_what_brute_force_finds_once_each),
         RT_CASE(a_query_stops_when_the_visitor_says_so_and_hands_its_answer_back),
         RT_CASE(boxes_that_touch_in_a_corner_meet_and_those_an_ulp_apart_do_not),
         RT_CASE(every_item_is_held_by_one_of_at_most_64_groups), RT_CASE(a_failed_allocation_is_reported_wherever_it_happens))

@@ -1,6 +1,6 @@
-/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What shipping one
- * mesh needs on the way is dropped before the other ships, so memory peaks at the product, the keys and boxes of the zone, and
- * what one mesh sends and receives. */
+/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What shipping
+ * one mesh needs on the way is dropped before the other ships, so memory peaks at the product, the keys and boxes of the zone,
+ * and what one mesh sends and receives. */
 #include "part/part_private.h"
 
 /* Where the cells of both meshes go. Collective. */
