@@ -20,7 +20,7 @@ static const struct {
   {"Res*", REMAP_VOLUME_MEAN}, {"GridVelocity*", REMAP_VOLUME_MEAN}, {"CoefPressure*", REMAP_VOLUME_MEAN},
   {"Pressure*", REMAP_VOLUME_MEAN}, {"Temperature*", REMAP_VOLUME_MEAN}, {"Mach*", REMAP_VOLUME_MEAN},
   {"Viscosity*", REMAP_VOLUME_MEAN}, {"Vorticity*", REMAP_VOLUME_MEAN}, {"TurbulentDistance*", REMAP_VOLUME_MEAN},
-  {"Density", REMAP_CONSERVED}, {"Momentum*", REMAP_CONSERVED}, {"RotatingMomentum*", REMAP_CONSERVED},
+  {"VelocitySound*", REMAP_VOLUME_MEAN}, {"Density", REMAP_CONSERVED}, {"Momentum*", REMAP_CONSERVED}, {"RotatingMomentum*", REMAP_CONSERVED},
   {"EnergyStagnationDensity", REMAP_CONSERVED}, {"RotatingEnergyStagnationDensity", REMAP_CONSERVED},
   {"SpeciesDensity*", REMAP_CONSERVED}, {"*Density", REMAP_CONSERVED}, {"Energy", REMAP_CONSERVED},
   {"Velocity*", REMAP_MASS_SPECIFIC}, {"RotatingVelocity*", REMAP_MASS_SPECIFIC}, {"EnergyInternal", REMAP_MASS_SPECIFIC},
@@ -28,8 +28,7 @@ static const struct {
   {"Entropy*", REMAP_MASS_SPECIFIC}, {"MassFraction*", REMAP_MASS_SPECIFIC}, {"MoleFraction*", REMAP_MASS_SPECIFIC},
   {"TurbulentEnergyKinetic", REMAP_MASS_SPECIFIC}, {"TurbulentDissipation", REMAP_MASS_SPECIFIC},
   {"TurbulentDissipationRate", REMAP_MASS_SPECIFIC}, {"TurbulentSANuTilde", REMAP_MASS_SPECIFIC},
-  {"ReynoldsStress*", REMAP_MASS_SPECIFIC}, {"Intermittency", REMAP_MASS_SPECIFIC},
-  {"VelocitySound*", REMAP_VOLUME_MEAN}};
+  {"ReynoldsStress*", REMAP_MASS_SPECIFIC}, {"Intermittency", REMAP_MASS_SPECIFIC}};
 
 remap_nature rcgns_nature(const char *name, int is_integer, int *known)
 {
