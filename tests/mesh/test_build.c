@@ -427,6 +427,46 @@ static void so_are_those_of_oblique_pancakes_and_needles(void)
   check_skewed(&(skewed){{20000, 31000, -7000}, {3, -1, 1}, {1, 2, -2}, {far, 0, 0}, 0}, 0x1p-49);
 }
 
+/* An angle of two thin legs, its box's centre far outside of it, on integer nodes: 6-gons at z = 0 and h, sheared and moved. */
+static void those_of_a_thin_angle_do_not_suffer_from_its_empty_box(void)
+{
+  const double   leg = 40000, t = 4, h = 20000, far = 0x1p40;
+  const double   outline[6][2] = {{0, 0}, {leg, 0}, {leg, t}, {t, t}, {t, leg}, {0, leg}};
+  const int64_t  node[]        = {5, 4, 3, 2, 1, 0, 6, 7, 8,  9, 10, 11, 0,  1,  7, 6, 1, 2,
+                                  8, 7, 2, 3, 9, 8, 3, 4, 10, 9, 4,  5,  11, 10, 5, 0, 6, 11};
+  const int64_t  offset[] = {0, 6, 12, 16, 20, 24, 28, 32, 36}, owner[8] = {0}, neighbour[] = {-1, -1, -1, -1, -1, -1, -1, -1};
+  const double   area = leg * t + t * (leg - t), mean = (leg * t * leg / 2 + t * (leg - t) * t / 2) / area;
+  double         xyz[36];
+  rm_arena      *arena = rm_arena_new();
+  rm_frame       frame;
+  remap_mesh     given = {.num_nodes      = 12,
+                          .num_faces      = 8,
+                          .num_cells      = 1,
+                          .node_xyz       = xyz,
+                          .face_offset    = offset,
+                          .face_node      = node,
+                          .face_owner     = owner,
+                          .face_neighbour = neighbour};
+  const rm_mesh *mesh;
+
+  for (int i = 0; i < 12; i++) {
+    const double x = outline[i % 6][0], y = outline[i % 6][1], z = i < 6 ? 0 : h;
+
+    xyz[3 * i]     = x + 3 * y - 2 * z + far; /* a map of determinant 35 */
+    xyz[3 * i + 1] = y + 5 * z - far;
+    xyz[3 * i + 2] = 2 * x + z;
+  }
+  mesh = build(arena, MPI_COMM_SELF, &given, REMAP_FACES_CENTRE, &frame);
+  if (mesh) {
+    const double scale = frame.scale, volume = 35 * area * h * scale * scale * scale;
+    const double at[3] = {mean + 3 * mean - h + far, mean + 5 * h / 2 - far, 2 * mean + h / 2};
+
+    RT_NEAR(mesh->cell_volume[0], volume, volume * 0x1p-50);
+    for (int a = 0; a < 3; a++) RT_NEAR(mesh->cell_centroid[0][a], at[a] * scale, 0x1p-50 * (leg + fabs(at[a])) * scale);
+  }
+  rm_arena_drop(arena);
+}
+
 /* One hexahedron of which every node is moved. */
 static const rm_mesh *single(rm_arena *arena, tm_map map, const void *data, rm_frame *frame)
 {
@@ -624,6 +664,7 @@ RT_MAIN(RT_CASE(cells_of_a_cube_fill_it_and_only_its_sides_are_skin),
         RT_CASE(a_face_of_three_zones_stays_skin_and_pairs_within_a_zone_come_first),
         RT_CASE(a_cell_of_no_thickness_lies_between_its_neighbours),
         RT_CASE(volumes_of_warped_cells_are_good_to_fifty_bits_anywhere), RT_CASE(so_are_those_of_oblique_pancakes_and_needles),
+        RT_CASE(those_of_a_thin_angle_do_not_suffer_from_its_empty_box),
         RT_CASE(a_flat_cell_has_no_volume_and_its_boxes_centre), RT_CASE(a_cell_one_ulp_thick_has_a_true_volume),
         RT_CASE(a_cell_turned_inside_out_has_negative_volume_and_is_counted), RT_CASE(collapsed_hexahedra_are_welcome),
         RT_CASE(cells_are_numbered_rank_after_rank_if_no_ids_are_given), RT_CASE(no_cells_at_all_make_an_empty_mesh),

@@ -21,9 +21,9 @@ typedef struct triangle {
 typedef struct workspace {
   double (*loop_xyz)[3]; /* [corners of the largest face] */
   int      *corner, *work;
-  triangle *triangle;  /* [triangles of the largest cell] */
-  double   *volume;    /* [2 triangles] terms of 6 V */
-  double   *moment[3]; /* [4 triangles] terms of 24 M */
+  triangle *triangle; /* [triangles of the largest cell] */
+  double   *volume;   /* [2 triangles] terms of 6 V */
+  double   *moment;   /* [2 triangles] terms of 24 M along one axis */
 } workspace;
 
 typedef struct vec {
@@ -54,7 +54,8 @@ static double sum_binned(double *x, int64_t n)
   rm_dd  high;
   int    exponent, spare = 1;
 
-  for (int64_t i = 0; i < n; i++) largest = fmax(largest, fabs(x[i]));
+  for (int64_t i = 0; i < n; i++)
+    if (fabs(x[i]) > largest) largest = fabs(x[i]);
   if (largest == 0.0) return 0.0;
   while (((int64_t)1 << spare) < n) spare++;
   frexp(largest, &exponent);
@@ -126,26 +127,48 @@ static int64_t collect(const rm_mesh *mesh, remap_faces faces, rm_lid cell, work
 
 /* ---- the two ways ---------------------------------------------------------------------------------------------------------- */
 
+/* Terms of 24 M along one axis, from those of 6 V: w times the sum of the corners from o. If all w have one sign, their products
+ * add up without cancellation and rounded ones will do; else they are kept in double-double. Returns how many there are. */
+static int64_t moment_terms(const triangle *list, int64_t num, const double *volume, double o, int axis, bool one_sign,
+                            double *out)
+{
+  for (int64_t i = 0; i < num; i++) {
+    const triangle *t = &list[i];
+    const double    w = volume[2 * i];
+
+    if (one_sign) {
+      out[i] = w * ((t->p[0][axis] - o) + (t->p[1][axis] - o) + (t->p[2][axis] - o));
+    } else {
+      const rm_dd  u = two_sum(t->p[0][axis], -o), v = two_sum(t->p[1][axis], -o), x = two_sum(t->p[2][axis], -o);
+      const rm_dd  uv = two_sum(u.hi, v.hi), sum = two_sum(uv.hi, x.hi), product = two_product(w, sum.hi);
+      const double rest = (uv.lo + sum.lo) + (u.lo + v.lo + x.lo);
+
+      out[2 * i]     = product.hi;
+      out[2 * i + 1] = product.lo + (w * rest + volume[2 * i + 1] * sum.hi);
+    }
+  }
+  return one_sign ? num : 2 * num;
+}
+
 /* 6 V and 24 M about o, rounded at the end. */
 static double sum_about(const double o[3], int64_t num, workspace *w, vec *moment)
 {
+  int64_t num_negative = 0, num_positive = 0;
+
   for (int64_t i = 0; i < num; i++) {
     const triangle *t = &w->triangle[i];
     const rm_dd     d = rm_det_dd(o, t->p[0], t->p[1], t->p[2]);
 
     w->volume[2 * i]     = t->sign * d.hi;
     w->volume[2 * i + 1] = t->sign * d.lo;
-    for (int a = 0; a < 3; a++) {
-      const rm_dd  u = two_sum(t->p[0][a], -o[a]), v = two_sum(t->p[1][a], -o[a]), x = two_sum(t->p[2][a], -o[a]);
-      const rm_dd  uv = two_sum(u.hi, v.hi), all = two_sum(uv.hi, x.hi);
-      const double rest    = (uv.lo + all.lo) + (u.lo + v.lo + x.lo);
-      const rm_dd  product = two_product(d.hi, all.hi);
-
-      w->moment[a][2 * i]     = t->sign * product.hi;
-      w->moment[a][2 * i + 1] = t->sign * (product.lo + (d.hi * rest + d.lo * all.hi));
-    }
+    num_negative += w->volume[2 * i] < 0.0;
+    num_positive += w->volume[2 * i] > 0.0;
   }
-  for (int a = 0; a < 3; a++) moment->x[a] = sum_binned(w->moment[a], 2 * num);
+  for (int a = 0; a < 3; a++) {
+    const bool one_sign = num_negative == 0 || num_positive == 0;
+
+    moment->x[a] = sum_binned(w->moment, moment_terms(w->triangle, num, w->volume, o[a], a, one_sign, w->moment));
+  }
   return sum_binned(w->volume, 2 * num);
 }
 
@@ -224,7 +247,7 @@ static remap_status make_workspace(rm_arena *scratch, const rm_mesh *mesh, works
   RM_NEW(w->work, scratch, 4 * corners);
   RM_NEW(w->triangle, scratch, triangles);
   RM_NEW(w->volume, scratch, 2 * triangles);
-  for (int a = 0; a < 3; a++) RM_NEW(w->moment[a], scratch, 2 * triangles);
+  RM_NEW(w->moment, scratch, 2 * triangles);
   return REMAP_OK;
 }
 
