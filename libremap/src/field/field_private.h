@@ -10,19 +10,6 @@
 
 #include <math.h>
 
-/* A sum with compensation (Neumaier): sum + lost. */
-typedef struct rm_compensated {
-  double sum, lost;
-} rm_compensated;
-static inline void rm_compensated_add(rm_compensated *s, double x)
-{
-  const double next = s->sum + x;
-
-  s->lost += fabs(s->sum) >= fabs(x) ? (s->sum - next) + x : (x - next) + s->sum;
-  s->sum = next;
-}
-static inline double rm_compensated_value(const rm_compensated *s) { return s->sum + s->lost; }
-
 /* ---- leastsq --------------------------------------------------------------------------------------------------- */
 
 /* What rounding leaves of the distances in one stencil. */
@@ -37,8 +24,9 @@ void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *nois
 
 /* ---- reconstruct ----------------------------------------------------------------------------------------------- */
 
-/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it; where
- * the field has slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled. */
+/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it (at
+ * order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own alone); where the field has
+ * slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled. */
 typedef struct rm_packing {
   int           width;
   int          *at;         /* [num_fields]                                                                  */

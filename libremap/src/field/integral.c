@@ -27,7 +27,7 @@ void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const re
     if (fields[f].nature == REMAP_FLAG) continue;
     for (rm_lid c = 0; c < mesh->num_cells; c++) {
       const double *place  = pack + (int64_t)c * packing->width + packing->at[f];
-      const double  value  = packing->scale[f] * place[0];
+      const double  value  = packing->scale[f] * fields[f].in[c];
       const double *slope  = packing->order[f] > 1 ? place + RM_PACK_SLOPE : NULL;
       const double  volume = mesh->cell_volume[c];
 

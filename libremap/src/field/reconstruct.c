@@ -61,6 +61,15 @@ static bool reconstruct_cell(const rm_stencil *stencil, const rm_mesh *mesh, rm_
   return factor < 1.0;
 }
 
+/* The mean belongs to the true centroid; what travels is the value at the rounded one, about which the moments are. */
+static void move_to_rounded_centroid(const double error[3], double scale, double *place)
+{
+  const double *slope = place + RM_PACK_SLOPE;
+  const double  rise  = slope[0] * error[0] + slope[1] * error[1] + slope[2] * error[2];
+
+  if (rise < 0.0 || rise > 0.0) place[0] = (scale * place[0] - rise) / scale;
+}
+
 /* Values of all fields side by side, for the halo exchange. */
 static void interleave(rm_lid num_cells, int num_fields, const remap_field_desc *fields, double *item)
 {
@@ -106,6 +115,7 @@ remap_status rm_reconstruct(rm_arena *arena, const rm_transfer_setup *setup, int
       if (packing->order[f] < 2) continue;
       if (setup->giving_rows->cover[c] != REMAP_UNCOVERED) {
         limited[f] += reconstruct_cell(setup->giving_stencil, mesh, c, &u, packing, place);
+        move_to_rounded_centroid(setup->giving_rows->centroid_error[c], packing->scale[f], place);
         continue;
       }
       for (int k = RM_PACK_SLOPE; k < (packing->has_bounds ? 6 : 4); k++) place[k] = 0.0; /* nobody asks for this cell */

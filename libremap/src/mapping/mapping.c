@@ -8,8 +8,6 @@
  * givers, so nothing that is summed along it can depend on where the pairs were made. O(p) time and memory for p pairs. */
 #include "mapping.h"
 
-#include <math.h>
-
 /* A pair on its way to the home of its receiving cell. */
 typedef struct pair_record {
   double  volume, moment[3]; /* about the giver's centroid */
@@ -27,9 +25,10 @@ typedef struct rows_draft {
   double  *volume;
   double (*moment)[3];
   uint8_t *same, *cover;
-  int     *giver_rank;
-  rm_lid  *giver_cell;
-  rm_gid  *giver_global;
+  double (*centroid_error)[3];
+  int    *giver_rank;
+  rm_lid *giver_cell;
+  rm_gid *giver_global;
   double (*giver_centroid)[3];
 } rows_draft;
 
@@ -74,6 +73,7 @@ static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pai
 {
   RM_NEW0(draft->offset, arena, num_cells + 1);
   RM_NEW0(draft->cover, arena, num_cells);
+  RM_NEW0(draft->centroid_error, arena, num_cells);
   RM_NEW(draft->giver, arena, num_pairs);
   RM_NEW(draft->volume, arena, num_pairs);
   RM_NEW(draft->moment, arena, num_pairs);
@@ -184,6 +184,7 @@ static void publish(const rows_draft *draft, rm_rows *rows)
   rows->moment         = (const double(*)[3])draft->moment;
   rows->same           = draft->same;
   rows->cover          = draft->cover;
+  rows->centroid_error = (const double(*)[3])draft->centroid_error;
   rows->giver_rank     = draft->giver_rank;
   rows->giver_cell     = draft->giver_cell;
   rows->giver_global   = draft->giver_global;
@@ -256,18 +257,37 @@ done:
   return status;
 }
 
-/* abs(sum of V - volume) / abs(volume), the sum in row order with compensation (Neumaier). */
+/* Where the pairs of a covered cell put its centroid, less where the mesh has it. Far from the origin the latter is rounded to a
+ * good part of a cell's size; a slope about it would carry content that the cell does not have. Not collective. */
+static void find_centroid_errors(const rm_mesh *mesh, const rm_rows *rows, rows_draft *draft)
+{
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    const int64_t  first = rows->offset[c], end = rows->offset[c + 1];
+    const double  *centroid  = mesh->cell_centroid[c];
+    rm_compensated moment[3] = {{0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
+
+    if (rows->cover[c] != REMAP_COVERED || rows->same[first] || !(fabs(mesh->cell_volume[c]) > 0.0)) continue;
+    for (int64_t k = first; k < end; k++) {
+      const double *other = rows->giver_centroid[rows->giver[k]]; /* about which this row's moments are */
+
+      for (int d = 0; d < 3; d++)
+        rm_compensated_add(&moment[d], rows->moment[k][d] + (other[d] - centroid[d]) * rows->volume[k]);
+    }
+    for (int d = 0; d < 3; d++) {
+      const double error = rm_compensated_value(&moment[d]) / mesh->cell_volume[c];
+
+      if (fabs(error) <= 0x1p-48 * fabs(centroid[d])) draft->centroid_error[c][d] = error;
+    }
+  }
+}
+
+/* abs(sum of V - volume) / abs(volume), the sum in row order. */
 static double closure_error(const rm_rows *rows, rm_lid cell, double cell_volume)
 {
-  double sum = 0.0, lost = 0.0;
+  rm_compensated sum = {-cell_volume, 0.0};
 
-  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const double x = rows->volume[k], next = sum + x;
-
-    lost += fabs(sum) >= fabs(x) ? (sum - next) + x : (x - next) + sum;
-    sum = next;
-  }
-  return fabs((sum - cell_volume) + lost) / fabs(cell_volume);
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) rm_compensated_add(&sum, rows->volume[k]);
+  return fabs(rm_compensated_value(&sum)) / fabs(cell_volume);
 }
 
 /* The worst closure of a side on this rank and the smallest global id of a cell that has it, or -1. */
@@ -333,6 +353,7 @@ remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_fra
   for (int side = 0; side < 2; side++)
     RM_TRY(bring_home(arena, comm, frame, mesh[side], part, moments, &draft[side], &mapping->rows[side], reason));
   RM_TRY(mark_same(comm, mesh, mapping->rows, draft));
+  for (int side = 0; side < 2; side++) find_centroid_errors(mesh[side], &mapping->rows[side], &draft[side]);
   RM_TRY(count_all(comm, mesh, mapping));
   RM_ASSERT(rm_mapping_check(mapping, mesh) == REMAP_OK);
   *out = mapping;

@@ -5,6 +5,8 @@
 
 #include "moments/moments.h"
 
+#include <math.h>
+
 /* The pairs of the cells of one side (the receiving cells), on the rank that handed them in. Read-only once built. Invariants:
  *   a row's pairs ascend by the giving cell's (Morton key of the centroid, centroid, volume, global id);
  *   giver[] points into the halo lists; each (rank, cell) is listed once there, ascending;
@@ -18,6 +20,9 @@ typedef struct rm_rows {
   const double (*moment)[3];   /* [same] integral of (x - c), c the GIVING cell's centroid                 */
   const uint8_t *same;         /* [same]                                                                   */
   const uint8_t *cover;        /* [num_cells] remap_cover                                                  */
+  const double (*centroid_error)[3]; /* [num_cells] true centroid less rm_mesh's, by which moments about the latter do not add
+                                  up to 0: what rounding took, at most 2^-48 of it; 0 where the pairs do not tell it (cells
+                                  that are not covered) or nobody needs it (same)                          */
   rm_lid         num_givers;   /* giving cells that this rank needs, from all ranks                        */
   const int     *giver_rank;   /* [num_givers] ascending                                                   */
   const rm_lid  *giver_cell;   /* [num_givers] number on that rank, ascending within a rank                */
@@ -41,6 +46,19 @@ remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_fra
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
 /* Every invariant that one rank can see; slow. Not collective. */
 remap_status rm_mapping_check(const rm_mapping *mapping, const rm_mesh *const mesh[2]);
+
+/* A sum with compensation (Neumaier): sum + lost. */
+typedef struct rm_compensated {
+  double sum, lost;
+} rm_compensated;
+static inline void rm_compensated_add(rm_compensated *s, double x)
+{
+  const double next = s->sum + x;
+
+  s->lost += fabs(s->sum) >= fabs(x) ? (s->sum - next) + x : (x - next) + s->sum;
+  s->sum = next;
+}
+static inline double rm_compensated_value(const rm_compensated *s) { return s->sum + s->lost; }
 
 /* Put n cells into canonical order: by the Morton key of the centroid, then centroid, volume and global id, compared in turn; no
  * numbering of a rank takes part. order [n] receives places of the arrays, [n] each. Not collective. Working memory from scratch.
