@@ -1,0 +1,286 @@
+/* options -- the command line: one table of options makes getopt's list and the help, one table per option its words. */
+#include "options.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  vsnprintf(why->text, sizeof why->text, format, args);
+  va_end(args);
+  return code;
+}
+
+/* ---- the table ---------------------------------------------------------------------------------------------------- */
+
+/* Options: letter or 0, name, what its argument is called or NULL, what it does. A second line of help follows after \n. */
+#define OPTION_LIST(X)                                                                                                 \
+  X(FIELDS, 'f', "fields", "LIST", "names or globs, comma separated; default every cell-centred field of SOURCE")      \
+  X(ORDER, 0, "order", "1|2", "accuracy of the transfer; default 2")                                                   \
+  X(LIMITER, 0, "limiter", "none|barth-jespersen|auto", "bounds on the slopes; auto, the default, is barth-jespersen") \
+  X(FACES, 0, "faces", "centre|diagonal", "how faces become triangles; default centre")                                \
+  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error",                                                  \
+    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                            \
+  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error",                                                     \
+    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                        \
+  X(SOLUTION, 0, "solution", "NAME", "the FlowSolution_t of SOURCE to take; default the only one there is")            \
+  X(STEP, 0, "step", "N|last", "or the one of a time step, counted from 1")                                            \
+  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", "the FlowSolution_t to write; default the source's name")           \
+  X(SOURCE_BASE, 0, "source-base", "NAME", "read this base of SOURCE only")                                            \
+  X(TARGET_BASE, 0, "target-base", "NAME", "read this base of TARGET only")                                            \
+  X(SCALE, 0, "scale", "FACTOR", "multiply SOURCE's coordinates first")                                                \
+  X(TRANSFORM, 0, "transform", "FILE", "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")               \
+  X(REPORT, 0, "report", "FILE", "write the report as JSON too")                                                       \
+  X(OUTPUT, 'o', "output", "OUTPUT", "the file to write: TARGET and the fields, as HDF5")                              \
+  X(QUIET, 'q', "quiet", NULL, "print neither report nor progress")                                                    \
+  X(VERBOSE, 'v', "verbose", NULL, "print zones and what the library says too")                                        \
+  X(VERSION, 0, "version", NULL, "print the version")                                                                  \
+  X(HELP, 'h', "help", NULL, "print this text")
+
+enum option_key {
+  FIRST_KEY = 256, /* above every letter, so that getopt's own answers cannot be mistaken */
+#define X(key, letter, name, argument, text) KEY_##key,
+  OPTION_LIST(X)
+#undef X
+      END_KEY
+};
+
+typedef struct option_row {
+  int         key;
+  char        letter;
+  const char *name, *argument, *text;
+} option_row;
+
+static const option_row rows[] = {
+#define X(key, letter, name, argument, text) {KEY_##key, letter, name, argument, text},
+    OPTION_LIST(X)
+#undef X
+};
+enum { NUM_ROWS = sizeof rows / sizeof *rows };
+
+/* A word of the command line and its value; lists end with a NULL word. */
+typedef struct word {
+  const char *text;
+  int         value;
+} word;
+
+static const word order_words[]     = {{"1", 1}, {"2", 2}, {NULL, 0}};
+static const word limiter_words[]   = {{"none", REMAP_LIMITER_NONE},
+                                       {"barth-jespersen", REMAP_LIMITER_BARTH_JESPERSEN},
+                                       {"auto", REMAP_LIMITER_AUTO},
+                                       {NULL, 0}};
+static const word faces_words[]     = {{"centre", REMAP_FACES_CENTRE}, {"diagonal", REMAP_FACES_DIAGONAL}, {NULL, 0}};
+static const word uncovered_words[] = {{"keep", REMAP_UNCOVERED_KEEP},
+                                       {"nearest", REMAP_UNCOVERED_NEAREST},
+                                       {"error", REMAP_UNCOVERED_ERROR},
+                                       {NULL, 0}};
+static const word partial_words[]   = {{"blend", REMAP_PARTIAL_BLEND},
+                                       {"normalise", REMAP_PARTIAL_NORMALISE},
+                                       {"conserve", REMAP_PARTIAL_CONSERVE},
+                                       {"error", REMAP_PARTIAL_ERROR},
+                                       {NULL, 0}};
+
+const char *cli_limiter_word(remap_limiter limiter)
+{
+  for (const word *w = limiter_words; w->text; w++)
+    if (w->value == (int)limiter) return w->text;
+  return "unknown";
+}
+
+/* ---- help --------------------------------------------------------------------------------------------------------- */
+
+void cli_options_help(FILE *out)
+{
+  fputs("remap [options] SOURCE TARGET -o OUTPUT            (also under mpirun -n P)\n\n"
+        "Transfer the cell-centred fields of the CGNS file SOURCE to the mesh of the CGNS file TARGET, conservatively.\n\n",
+        out);
+  for (int i = 0; i < NUM_ROWS; i++) {
+    const option_row *row  = &rows[i];
+    const char       *text = row->text, *end = strchr(text, '\n');
+    int               width;
+
+    if (row->letter)
+      width = fprintf(out, "  -%c, --%s", row->letter, row->name);
+    else
+      width = fprintf(out, "      --%s", row->name);
+    if (row->argument) width += fprintf(out, " %s", row->argument);
+    if (width > 34) width = fprintf(out, "\n") - 1;
+    fprintf(out, "%*s  %.*s\n", 34 - width, "", end ? (int)(end - text) : (int)strlen(text), text);
+    if (end) fprintf(out, "%36s%s\n", "", end + 1);
+  }
+  fputs("\nExit status:\n", out);
+#define X(name, number, text) fprintf(out, "  %d  %s\n", number, text);
+  CLI_EXIT_LIST(X)
+#undef X
+}
+
+/* ---- parsing ------------------------------------------------------------------------------------------------------ */
+
+static cli_exit pick(const word *words, const option_row *row, const char *argument, int *value, cli_failure *why)
+{
+  for (const word *w = words; w->text; w++)
+    if (!strcmp(w->text, argument)) {
+      *value = w->value;
+      return CLI_DONE;
+    }
+  return cli_fail(why, CLI_USAGE, "--%s: '%.200s' is not offered: give %s", row->name, argument, row->argument);
+}
+
+/* The whole of text as a number; false if it is none. */
+static bool number(const char *text, double *value)
+{
+  char *end;
+
+  *value = strtod(text, &end);
+  return end != text && !*end;
+}
+
+static cli_exit parse_uncovered(const option_row *row, const char *argument, remap_transfer *transfer, cli_failure *why)
+{
+  int value = 0;
+
+  if (!strncmp(argument, "fill=", 5)) {
+    if (!number(argument + 5, &transfer->fill_value) || isinf(transfer->fill_value))
+      return cli_fail(why, CLI_USAGE, "--on-uncovered: '%.200s' is no number: give fill=VALUE", argument + 5);
+    transfer->on_uncovered = REMAP_UNCOVERED_FILL;
+    return CLI_DONE;
+  }
+  CLI_TRY(pick(uncovered_words, row, argument, &value, why));
+  transfer->on_uncovered = (remap_on_uncovered)value;
+  return CLI_DONE;
+}
+
+static cli_exit parse_step(const char *argument, int64_t *step, cli_failure *why)
+{
+  char *end;
+
+  if (!strcmp(argument, "last")) {
+    *step = -1;
+    return CLI_DONE;
+  }
+  errno = 0;
+  *step = strtoll(argument, &end, 10);
+  if (end == argument || *end || errno || *step < 1)
+    return cli_fail(why, CLI_USAGE, "--step: '%.200s' is no step: give a number from 1 or last", argument);
+  return CLI_DONE;
+}
+
+static cli_exit parse_one(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
+{
+  int value = 0;
+
+  if (argument && !*argument) return cli_fail(why, CLI_USAGE, "--%s: its argument is empty: give %s", row->name, row->argument);
+  switch (row->key) {
+    case KEY_FIELDS: out->fields = argument; break;
+    case KEY_ORDER:
+      CLI_TRY(pick(order_words, row, argument, &value, why));
+      out->transfer.order = value;
+      break;
+    case KEY_LIMITER:
+      CLI_TRY(pick(limiter_words, row, argument, &value, why));
+      out->transfer.limiter = (remap_limiter)value;
+      break;
+    case KEY_FACES:
+      CLI_TRY(pick(faces_words, row, argument, &value, why));
+      out->faces = (remap_faces)value;
+      break;
+    case KEY_ON_UNCOVERED: return parse_uncovered(row, argument, &out->transfer, why);
+    case KEY_ON_PARTIAL:
+      CLI_TRY(pick(partial_words, row, argument, &value, why));
+      out->transfer.on_partial = (remap_on_partial)value;
+      break;
+    case KEY_SOLUTION: out->solution = argument; break;
+    case KEY_STEP: return parse_step(argument, &out->step, why);
+    case KEY_OUTPUT_SOLUTION: out->output_solution = argument; break;
+    case KEY_SOURCE_BASE: out->base[REMAP_SOURCE] = argument; break;
+    case KEY_TARGET_BASE: out->base[REMAP_TARGET] = argument; break;
+    case KEY_SCALE:
+      if (!number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
+        return cli_fail(why, CLI_USAGE, "--scale: '%.200s' is no factor: give a positive number", argument);
+      break;
+    case KEY_TRANSFORM: out->transform = argument; break;
+    case KEY_REPORT: out->report = argument; break;
+    case KEY_OUTPUT: out->output = argument; break;
+    case KEY_QUIET: out->quiet = true; break;
+    case KEY_VERBOSE: out->verbose = true; break;
+    case KEY_VERSION: out->version = true; break;
+    case KEY_HELP: out->help = true; break;
+    default: break;
+  }
+  return CLI_DONE;
+}
+
+/* The row of what getopt_long answered; NULL if it is none. */
+static const option_row *row_of(int key)
+{
+  for (int i = 0; i < NUM_ROWS; i++)
+    if (rows[i].key == key || (rows[i].letter && rows[i].letter == key)) return &rows[i];
+  return NULL;
+}
+
+static cli_exit add_path(cli_options *out, int *num_paths, const char *path, cli_failure *why)
+{
+  if (!*path) return cli_fail(why, CLI_USAGE, "the name of a file is empty: give SOURCE TARGET -o OUTPUT");
+  if (*num_paths == 2)
+    return cli_fail(why, CLI_USAGE, "'%.200s' is one file too many: give SOURCE TARGET -o OUTPUT, see remap --help", path);
+  out->path[(*num_paths)++] = path;
+  return CLI_DONE;
+}
+
+/* What fits together, once everything is read. */
+static cli_exit check_whole(const cli_options *out, int num_paths, cli_failure *why)
+{
+  if (num_paths < 2) return cli_fail(why, CLI_USAGE, "two files are needed: give SOURCE TARGET -o OUTPUT, see remap --help");
+  if (!out->output) return cli_fail(why, CLI_USAGE, "no file to write: give -o OUTPUT, see remap --help");
+  if (out->solution && out->step)
+    return cli_fail(why, CLI_USAGE, "--solution and --step both choose a solution: give one of them");
+  return CLI_DONE;
+}
+
+static cli_exit refuse(int key, const char *given, cli_failure *why)
+{
+  if (key != ':') /* getopt's word for a missing argument */
+    return cli_fail(why, CLI_USAGE, "option '%.200s' is unknown, ambiguous or takes no argument: see remap --help", given);
+  return cli_fail(why, CLI_USAGE, "option '%.200s' lacks its argument: see remap --help", given);
+}
+
+cli_exit cli_options_parse(int argc, char **argv, cli_options *out, cli_failure *why)
+{
+  struct option table[NUM_ROWS + 1]       = {{0}};
+  char          letters[2 * NUM_ROWS + 3] = "-:"; /* files come in order as 1; a missing argument comes as ':' */
+  int           key, num_paths = 0;
+
+  *out = (cli_options){.scale = 1};
+  remap_transfer_default(&out->transfer);
+  for (int i = 0; i < NUM_ROWS; i++) {
+    const char short_form[3] = {rows[i].letter, rows[i].argument ? ':' : '\0', '\0'};
+
+    table[i] = (struct option){rows[i].name, rows[i].argument ? required_argument : no_argument, NULL, rows[i].key};
+    strcat(letters, short_form);
+  }
+  opterr = 0;
+  optind = 1;
+  for (;;) {
+    const int         at  = optind;
+    const option_row *row = NULL;
+
+    if ((key = getopt_long(argc, argv, letters, table, NULL)) == -1) break;
+    if (key == 1) {
+      CLI_TRY(add_path(out, &num_paths, optarg, why));
+      continue;
+    }
+    row = row_of(key);
+    if (!row) return refuse(key, argv[at < argc ? at : argc - 1], why);
+    CLI_TRY(parse_one(row, optarg, out, why));
+  }
+  if (out->help || out->version) return CLI_DONE;
+  for (; optind < argc; optind++) CLI_TRY(add_path(out, &num_paths, argv[optind], why));
+  return check_whole(out, num_paths, why);
+}

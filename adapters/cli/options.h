@@ -1,0 +1,38 @@
+/* options.h -- the command line of remap as plain data. */
+#ifndef REMAP_CLI_OPTIONS_H
+#define REMAP_CLI_OPTIONS_H
+
+#include "cli.h"
+
+#include <remap/remap.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+/** What was asked for. Texts point into argv; NULL where an option was not given. */
+typedef struct cli_options {
+  const char    *path[2]; /**< [remap_side] */
+  const char    *output;
+  const char    *report;
+  const char    *fields;  /**< names and globs, comma separated */
+  const char    *base[2]; /**< [remap_side] */
+  const char    *solution, *output_solution;
+  const char    *transform; /**< path of a 3x4 matrix */
+  int64_t        step;      /**< 1 ..; -1 the last; 0 not given */
+  double         scale;
+  remap_faces    faces;
+  remap_transfer transfer;
+  bool           quiet, verbose, help, version;
+} cli_options;
+
+/** Read the command line. With --help or --version nothing else is demanded. The same on all ranks; not collective.
+ *  Errors: USAGE. */
+cli_exit cli_options_parse(int argc, char **argv, cli_options *out, cli_failure *why);
+
+/** What --help prints. Not collective. */
+void cli_options_help(FILE *out);
+
+/** The word of the command line for a limiter. Static text. Not collective. */
+const char *cli_limiter_word(remap_limiter limiter);
+
+#endif

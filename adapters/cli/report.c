@@ -1,0 +1,246 @@
+/* report -- what the job found, as text and as JSON. Its numbers have 17 digits in JSON, so that they read back exactly. */
+#include "report.h"
+#include "options.h"
+
+#include <errno.h>
+#include <jansson.h>
+#include <libgen.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char *const side_word[2] = {"source", "target"};
+
+static const char *nature_word(remap_nature nature)
+{
+  switch (nature) {
+    case REMAP_CONSERVED: return "conserved";
+    case REMAP_MASS_SPECIFIC: return "mass-specific";
+    case REMAP_VOLUME_MEAN: return "volume-mean";
+    case REMAP_FLAG: return "flag";
+  }
+  return "unknown";
+}
+
+/* ---- text --------------------------------------------------------------------------------------------------------- */
+
+static const char *plural(int64_t count) { return count == 1 ? "" : "s"; }
+
+void cli_report_meshes(FILE *out, const cli_report *report, int verbose)
+{
+  fprintf(out, "remap %s on %d rank%s\n", remap_version(), report->stats.ranks, plural(report->stats.ranks));
+  for (int side = 0; side < 2; side++) {
+    const rcgns_info *info = report->info[side];
+
+    fprintf(out, "%s  %s  %s", side_word[side], info->path, info->format);
+    if (info->version > 0) fprintf(out, " %g", info->version);
+    fprintf(out, ", %lld zone%s, %lld cell%s\n", (long long)info->num_zones, plural(info->num_zones),
+            (long long)info->num_cells, plural(info->num_cells));
+    for (int64_t z = 0; verbose && z < info->num_zones; z++)
+      fprintf(out, "        %-32s %s, %lld cells\n", info->zone[z].name, info->zone[z].is_structured ? "block" : "elements",
+              (long long)info->zone[z].num_cells);
+  }
+  fflush(out);
+}
+
+void cli_report_overlap(FILE *out, const cli_report *report)
+{
+  const remap_stats *stats = &report->stats;
+
+  fprintf(out, "\noverlap %lld pairs, volume %.12g\n", (long long)stats->pairs, stats->overlap_volume);
+  fprintf(out, "%-8s%18s %12s %12s %12s %10s\n", "", "volume", "covered", "in part", "not", "closure");
+  for (int side = 0; side < 2; side++)
+    fprintf(out, "%-8s%18.12g %12lld %12lld %12lld %10.1e\n", side_word[side], stats->volume[side],
+            (long long)stats->cells_by_cover[side][REMAP_COVERED], (long long)stats->cells_by_cover[side][REMAP_PARTIAL],
+            (long long)stats->cells_by_cover[side][REMAP_UNCOVERED], stats->max_closure_error[side]);
+  fflush(out);
+}
+
+void cli_report_fields(FILE *out, const cli_report *report)
+{
+  int width = 24;
+
+  for (int i = 0; i < report->num_fields; i++)
+    if ((int)strlen(report->field[i].name) > width) width = (int)strlen(report->field[i].name);
+  fprintf(out, "\n%-*s %-13s %20s %20s %8s  %s\n", width, "field", "nature", "source integral", "target integral", "error",
+          "range of source, of target");
+  for (int i = 0; i < report->num_fields; i++) {
+    const cli_field_row      *row  = &report->field[i];
+    const remap_field_report *what = &row->what;
+
+    fprintf(out, "%-*s %-13s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name, nature_word(row->nature),
+            what->source_integral, what->target_integral, what->conservation_error, what->source_min, what->source_max,
+            what->target_min, what->target_max);
+  }
+  fflush(out);
+}
+
+void cli_report_end(FILE *out, const cli_report *report)
+{
+  const remap_stats *stats = &report->stats;
+
+  fputc('\n', out);
+  for (int i = 0; i < report->num_notes; i++) fprintf(out, "note    %s\n", report->note[i]);
+  fprintf(out, "time    read %.2f s, partition %.2f s, overlay %.2f s, transfer %.2f s, write %.2f s, total %.2f s\n",
+          report->seconds_read, stats->seconds_partition, stats->seconds_overlay, report->seconds_transfer,
+          report->seconds_write, report->seconds_total);
+  fprintf(out, "memory  %.1f MB on the rank that needs most\n", 1e-6 * (double)report->peak_rss);
+  if (report->output) fprintf(out, "output  %s, fields in %s\n", report->output, report->solution[REMAP_TARGET]);
+  fflush(out);
+}
+
+/* ---- JSON --------------------------------------------------------------------------------------------------------- */
+
+/* JSON knows no NaN and no infinity: null. */
+static json_t *real(double value)
+{
+  json_t *number = json_real(value);
+
+  return number ? number : json_null();
+}
+
+static json_t *side_json(const cli_report *report, remap_side side)
+{
+  const rcgns_info *info = report->info[side];
+
+  return json_pack("{s:s, s:I, s:I, s:o, s:I, s:s?}", "file", info->path, "zones", (json_int_t)info->num_zones, "cells",
+                   (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "inverted_cells",
+                   (json_int_t)report->stats.inverted_cells[side], "solution", report->solution[side]);
+}
+
+static json_t *overlap_json(const remap_stats *stats)
+{
+  static const char *const cover_word[3] = {"uncovered", "partial", "covered"};
+  json_t                  *overlap       = json_object();
+  char                     key[64];
+
+  json_object_set_new(overlap, "pairs", json_integer((json_int_t)stats->pairs));
+  json_object_set_new(overlap, "volume", real(stats->overlap_volume));
+  for (int side = 0; side < 2; side++) {
+    for (int cover = REMAP_COVERED; cover >= REMAP_UNCOVERED; cover--) {
+      snprintf(key, sizeof key, "%s_%s", side_word[side], cover_word[cover]);
+      json_object_set_new(overlap, key, json_integer((json_int_t)stats->cells_by_cover[side][cover]));
+    }
+    snprintf(key, sizeof key, "max_closure_error_%s", side_word[side]);
+    json_object_set_new(overlap, key, real(stats->max_closure_error[side]));
+    snprintf(key, sizeof key, "zone_overlap_%s", side_word[side]);
+    json_object_set_new(overlap, key, real(stats->zone_overlap[side]));
+  }
+  return overlap;
+}
+
+static json_t *field_json(const cli_field_row *row)
+{
+  const remap_field_report *what = &row->what;
+
+  return json_pack("{s:s, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I}", "name", row->name, "nature",
+                   nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter), "source_integral",
+                   real(what->source_integral), "target_integral", real(what->target_integral), "conservation_error",
+                   real(what->conservation_error), "source_min", real(what->source_min), "source_max", real(what->source_max),
+                   "target_min", real(what->target_min), "target_max", real(what->target_max), "limited_cells",
+                   (json_int_t)what->limited_cells);
+}
+
+/* The whole report; NULL if memory is out. The caller ends it with json_decref. */
+static json_t *report_json(const cli_report *report)
+{
+  const remap_stats *stats  = &report->stats;
+  json_t            *fields = json_array(), *notes = json_array();
+
+  for (int i = 0; i < report->num_fields; i++) json_array_append_new(fields, field_json(&report->field[i]));
+  for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, json_string(report->note[i]));
+  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version", remap_version(),
+                   "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target", side_json(report, REMAP_TARGET),
+                   "overlap", overlap_json(stats), "fields", fields, "time", "read", real(report->seconds_read), "partition",
+                   real(stats->seconds_partition), "overlay", real(stats->seconds_overlay), "transfer",
+                   real(report->seconds_transfer), "write", real(report->seconds_write), "total", real(report->seconds_total),
+                   "memory", "peak_rss_bytes_max", (json_int_t)report->peak_rss, "notes", notes);
+}
+
+/* ---- the file ----------------------------------------------------------------------------------------------------- */
+
+static cli_exit no_memory(cli_failure *why) { return cli_fail(why, CLI_INTERNAL, "memory is out on one rank: use more ranks"); }
+
+/* What identifies the folder that path lies in; false if there is none. */
+static bool folder_of(const char *path, struct stat *out)
+{
+  char      *copy = strdup(path);
+  const bool ok   = copy && stat(dirname(copy), out) == 0;
+
+  free(copy);
+  return ok;
+}
+
+static const char *last_part(const char *path)
+{
+  const char *slash = strrchr(path, '/');
+
+  return slash ? slash + 1 : path;
+}
+
+/* Do two paths name one file, which need not exist yet? */
+static bool same_file(const char *a, const char *b)
+{
+  struct stat sa, sb;
+
+  if (stat(a, &sa) == 0 && stat(b, &sb) == 0) return sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
+  return !strcmp(last_part(a), last_part(b)) && folder_of(a, &sa) && folder_of(b, &sb) && sa.st_dev == sb.st_dev &&
+         sa.st_ino == sb.st_ino;
+}
+
+cli_exit cli_report_open(const char *path, int num_others, const char *const *others, cli_report_file *out, cli_failure *why)
+{
+  struct stat  there;
+  const bool   exists = stat(path, &there) == 0, in_place = exists && !S_ISREG(there.st_mode);
+  const size_t size = strlen(path) + sizeof ".part";
+
+  *out = (cli_report_file){.path = path};
+  for (int i = 0; i < num_others; i++)
+    if (same_file(path, others[i])) return cli_fail(why, CLI_USAGE, "%s: it is used already: give --report another file", path);
+  if (!in_place && !(out->part = malloc(size))) return no_memory(why);
+  if (out->part) snprintf(out->part, size, "%s.part", path);
+  out->stream = fopen(in_place ? path : out->part, "w");
+  if (!out->stream) {
+    const int number = errno;
+
+    free(out->part);
+    out->part = NULL;
+    return cli_fail(why, CLI_IO, "%s: the report cannot be written: %s: give --report another file", path, strerror(number));
+  }
+  return CLI_DONE;
+}
+
+void cli_report_discard(cli_report_file *file)
+{
+  if (file->stream) fclose(file->stream);
+  if (file->part) unlink(file->part);
+  free(file->part);
+  *file = (cli_report_file){.path = file->path};
+}
+
+cli_exit cli_report_commit(cli_report_file *file, const cli_report *report, cli_failure *why)
+{
+  json_t *json = report_json(report);
+  bool    ok;
+  int     number;
+
+  if (!json) {
+    cli_report_discard(file);
+    return no_memory(why);
+  }
+  errno  = 0;
+  ok     = json_dumpf(json, file->stream, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) == 0 && fputc('\n', file->stream) != EOF;
+  ok     = fclose(file->stream) == 0 && ok;
+  ok     = ok && (!file->part || rename(file->part, file->path) == 0);
+  number = errno;
+  file->stream = NULL;
+  json_decref(json);
+  if (ok) { /* part is no longer there */
+    free(file->part);
+    file->part = NULL;
+  }
+  cli_report_discard(file);
+  if (!ok) return cli_fail(why, CLI_IO, "%s: the report cannot be written: %s", file->path, strerror(number));
+  return CLI_DONE;
+}

@@ -1,0 +1,62 @@
+/* report.h -- what the job found: text on standard output for people, a JSON file for programs. One rank calls these. */
+#ifndef REMAP_CLI_REPORT_H
+#define REMAP_CLI_REPORT_H
+
+#include "cli.h"
+
+#include <cgns.h>
+#include <remap/remap.h>
+#include <stdint.h>
+#include <stdio.h>
+
+/** Greatest errors that pass verification. */
+#define CLI_MAX_CLOSURE      1e-10
+#define CLI_MAX_CONSERVATION 1e-12
+
+/** One transferred field. */
+typedef struct cli_field_row {
+  const char        *name;
+  remap_nature       nature;
+  remap_limiter      limiter; /**< in effect */
+  remap_field_report what;
+} cli_field_row;
+
+/** Everything there is to tell; texts are borrowed. */
+typedef struct cli_report {
+  const rcgns_info    *info[2]; /**< [remap_side] */
+  remap_stats          stats;
+  const char          *solution[2]; /**< [remap_side] names of the FlowSolution_t read and written */
+  const char          *output;
+  int                  num_fields;
+  const cli_field_row *field; /**< [num_fields] */
+  int                  num_notes;
+  char *const         *note;                                                         /**< [num_notes] remarks */
+  double               seconds_read, seconds_transfer, seconds_write, seconds_total; /**< wall clock, slowest rank */
+  int64_t              peak_rss;                                                     /**< bytes of the rank that needs most */
+} cli_report;
+
+/** Who reads what: the version, the meshes and, if verbose, their zones. */
+void cli_report_meshes(FILE *out, const cli_report *report, int verbose);
+/** The overlap: pairs, volumes, coverage, closure. */
+void cli_report_overlap(FILE *out, const cli_report *report);
+/** A line per field: what was conserved. */
+void cli_report_fields(FILE *out, const cli_report *report);
+/** Remarks, time per phase, memory, the file written; output is not mentioned if it is NULL. */
+void cli_report_end(FILE *out, const cli_report *report);
+
+/** A report file under way: it appears under its name when it is complete. */
+typedef struct cli_report_file {
+  FILE       *stream;
+  char       *part; /**< the name it has until then; NULL if the final name is no regular file, say a terminal */
+  const char *path;
+} cli_report_file;
+
+/** Make sure that the report can be written, before the work begins. inputs are [num_inputs] paths that must not be it.
+ *  The caller ends *out with cli_report_commit or cli_report_discard. Errors: USAGE, IO, INTERNAL. */
+cli_exit cli_report_open(const char *path, int num_others, const char *const *others, cli_report_file *out, cli_failure *why);
+/** Write the report and give the file its name. Errors: IO, INTERNAL; then nothing is left behind. */
+cli_exit cli_report_commit(cli_report_file *file, const cli_report *report, cli_failure *why);
+/** Leave nothing behind; harmless on a file that is not open. */
+void cli_report_discard(cli_report_file *file);
+
+#endif

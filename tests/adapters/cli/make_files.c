@@ -1,0 +1,229 @@
+/* make_files -- write the small CGNS files that the tests of the remap command run on, good ones and broken ones.
+ *
+ *   ./make_files DIR
+ *
+ * Every file holds the cube from `low` to `high` as n x n x n hexahedra, with what its recipe changes. */
+#include <cgns_io.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_N = 4, MAX_NODES = (MAX_N + 1) * (MAX_N + 1) * (MAX_N + 1), MAX_CELLS = MAX_N * MAX_N * MAX_N };
+
+/* What is in a file, and what is wrong with it. */
+typedef struct recipe {
+  const char *name;
+  int         n;
+  double      low, high;
+  double      fields;      /* not 0: FlowSolution with Density of that value, more or less, and others */
+  double      second;      /* not 0: a second solution, Other */
+  double      second_zone; /* not 0: a second zone, from there on */
+  bool        is_ngon;     /* NGON_n and NFACE_n, one cell */
+  bool        is_surface;  /* quadrilaterals only */
+  bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices, huge;
+} recipe;
+
+static const recipe recipes[] = {
+    {.name = "good", .n = 4, .high = 1, .fields = 1},
+    {.name = "mesh", .n = 3, .high = 1},
+    {.name = "half", .n = 3, .low = .5, .high = 1.5},
+    {.name = "old", .n = 3, .low = .5, .high = 1.5, .fields = 7},
+    {.name = "far", .n = 2, .low = 10, .high = 11},
+    {.name = "big", .n = 2, .high = 1000},
+    {.name = "two_solutions", .n = 2, .high = 1, .fields = 1, .second = 2},
+    {.name = "two_zones", .n = 2, .high = 1, .second_zone = 1},
+    {.name = "no_volume", .n = 2, .high = 1, .is_surface = true},
+    {.name = "no_coordinates", .n = 2, .high = 1, .fields = 1, .no_coordinates = true},
+    {.name = "nan_coordinate", .n = 2, .high = 1, .fields = 1, .nan_coordinate = true},
+    {.name = "far_node", .n = 2, .high = 1, .fields = 1, .far_node = true},
+    {.name = "closed_cell", .n = 1, .high = 1, .is_ngon = true},
+    {.name = "open_cell", .n = 1, .high = 1, .is_ngon = true, .open_cell = true},
+    {.name = "three_cells", .n = 1, .high = 1, .is_ngon = true, .three_cells = true},
+    {.name = "short_field", .n = 2, .high = 1, .fields = 1, .short_field = true},
+    {.name = "nan_field", .n = 2, .high = 1, .fields = 1, .nan_field = true},
+    {.name = "at_vertices", .n = 2, .high = 1, .fields = 1, .at_vertices = true},
+    {.name = "zones_overlap", .n = 2, .high = 1, .second_zone = .25},
+    {.name = "huge", .n = 2, .high = 1, .huge = true},
+};
+
+static int file; /* cgio's handle */
+
+static void must(int error, const char *what)
+{
+  char text[400];
+
+  if (!error) return;
+  cgio_error_message(text);
+  fprintf(stderr, "make_files: %s: %s\n", what, text);
+  exit(1);
+}
+
+/* A node; type MT has no data, data NULL leaves the array unwritten. */
+static double add(double parent, const char *name, const char *label, const char *type, int nd, const cgsize_t *dims,
+                  const void *data)
+{
+  double id;
+
+  must(cgio_create_node(file, parent, name, &id), name);
+  must(cgio_set_label(file, id, label), name);
+  if (strcmp(type, "MT")) must(cgio_set_dimensions(file, id, type, nd, dims), name);
+  if (data) must(cgio_write_all_data(file, id, data), name);
+  return id;
+}
+
+static double add_1d(double parent, const char *name, const char *label, const char *type, int count, const void *data)
+{
+  const cgsize_t dims[1] = {count};
+
+  return add(parent, name, label, type, 1, dims, data);
+}
+
+static double add_text(double parent, const char *name, const char *label, const char *text)
+{
+  return add_1d(parent, name, label, "C1", (int)strlen(text), text);
+}
+
+static void add_coordinates(double zone, const recipe *r, double low, double high)
+{
+  static const char *const name[3] = {"CoordinateX", "CoordinateY", "CoordinateZ"};
+  const double             grid    = add(zone, "GridCoordinates", "GridCoordinates_t", "MT", 0, NULL, NULL);
+  const int                row = r->n + 1, count = row * row * row;
+  double                   x[MAX_NODES];
+
+  for (int d = 0; d < 3; d++) {
+    for (int i = 0; i < count; i++) {
+      const int    place = d == 0 ? i % row : d == 1 ? i / row % row : i / row / row;
+      const double from = d == 0 ? low : r->low, to = d == 0 ? high : r->high;
+
+      x[i] = place == r->n ? to : from + (to - from) * place / r->n;
+    }
+    if (r->nan_coordinate && d == 1) x[count - 1] = NAN;
+    add_1d(grid, name[d], "DataArray_t", "R8", count, x);
+  }
+}
+
+static double add_section(double zone, const char *name, int code, int first, int last, int length, const int *connectivity)
+{
+  const int    element[2] = {code, 0}, range[2] = {first, last};
+  const double section = add_1d(zone, name, "Elements_t", "I4", 2, element);
+
+  add_1d(section, "ElementRange", "IndexRange_t", "I4", 2, range);
+  add_1d(section, "ElementConnectivity", "DataArray_t", "I4", length, connectivity);
+  return section;
+}
+
+static void add_hexahedra(double zone, const recipe *r)
+{
+  const int row = r->n + 1, layer      = row * row;
+  int       node[MAX_CELLS * 8], count = 0;
+
+  for (int k = 0; k < r->n; k++)
+    for (int j = 0; j < r->n; j++)
+      for (int i = 0; i < r->n; i++) {
+        const int first         = 1 + i + row * j + layer * k;
+        const int hexahedron[8] = {first,         first + 1,         first + 1 + row,         first + row,
+                                   first + layer, first + layer + 1, first + layer + 1 + row, first + layer + row};
+
+        memcpy(node + count, hexahedron, sizeof hexahedron);
+        count += 8;
+      }
+  if (r->far_node) node[count - 1] = 1000;
+  add_section(zone, "Hexahedra", 17, 1, count / 8, count, node);
+}
+
+static void add_surface(double zone)
+{
+  const int quadrilateral[4] = {1, 2, 5, 4};
+
+  add_section(zone, "Quadrilaterals", 7, 1, 1, 4, quadrilateral);
+}
+
+/* The one cell of a cube as a polyhedron; its face 6 is left out of an open cell and claimed by three in all of three_cells. */
+static void add_polyhedron(double zone, const recipe *r)
+{
+  static const int nodes[24]      = {1, 3, 4, 2, 5, 6, 8, 7, 1, 2, 6, 5, 3, 7, 8, 4, 1, 5, 7, 3, 2, 4, 8, 6};
+  static const int faces[18]      = {1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 5, 6};
+  static const int node_offset[7] = {0, 4, 8, 12, 16, 20, 24}, face_offset[4] = {0, 6, 12, 18}, open_offset[2] = {0, 5};
+  const int        cells = r->three_cells ? 3 : 1;
+  double           section;
+
+  section = add_section(zone, "Faces", 22, 1, 6, 24, nodes);
+  add_1d(section, "ElementStartOffset", "DataArray_t", "I4", 7, node_offset);
+  section = add_section(zone, "Cells", 23, 7, 6 + cells, r->open_cell ? 5 : 6 * cells, faces);
+  add_1d(section, "ElementStartOffset", "DataArray_t", "I4", cells + 1, r->open_cell ? open_offset : face_offset);
+}
+
+static void add_solution(double zone, const recipe *r, const char *name, double value)
+{
+  const int    cells = r->n * r->n * r->n, row = r->n + 1;
+  const int    count    = r->at_vertices ? row * row * row : cells;
+  const double solution = add(zone, name, "FlowSolution_t", "MT", 0, NULL, NULL);
+  double       x[MAX_NODES];
+  int          flag[MAX_NODES];
+
+  add_text(solution, "GridLocation", "GridLocation_t", r->at_vertices ? "Vertex" : "CellCenter");
+  for (int i = 0; i < count; i++) x[i] = value + .1 * sin(3 * i), flag[i] = i % 2;
+  add_1d(solution, "Density", "DataArray_t", "R8", r->short_field ? count - 1 : count, x);
+  for (int i = 0; i < count; i++) x[i] = r->nan_field && i == 2 ? NAN : cos(i);
+  add_1d(solution, "MomentumX", "DataArray_t", "R8", count, x);
+  add_1d(solution, "Tracer", "DataArray_t", "R8", count, x);
+  add_1d(solution, "cellN", "DataArray_t", "I4", count, flag);
+}
+
+static void add_zone(double base, const recipe *r, const char *name, double low, double high)
+{
+  const int      row = r->n + 1, count = r->huge ? 2000000000 : row * row * row;
+  const int      sizes[3] = {count, r->n * r->n * r->n, 0};
+  const cgsize_t dims[2]  = {1, 3};
+  const double   zone     = add(base, name, "Zone_t", "I4", 2, dims, sizes);
+
+  add_text(zone, "ZoneType", "ZoneType_t", "Unstructured");
+  if (r->huge) {
+    const double grid = add(zone, "GridCoordinates", "GridCoordinates_t", "MT", 0, NULL, NULL);
+
+    for (int d = 0; d < 3; d++) {
+      const char coordinate[] = {'C', 'o', 'o', 'r', 'd', 'i', 'n', 'a', 't', 'e', (char)('X' + d), '\0'};
+
+      add_1d(grid, coordinate, "DataArray_t", "R8", count, NULL);
+    }
+  } else if (!r->no_coordinates) {
+    add_coordinates(zone, r, low, high);
+  }
+  if (r->is_surface)
+    add_surface(zone);
+  else if (r->is_ngon)
+    add_polyhedron(zone, r);
+  else
+    add_hexahedra(zone, r);
+  if (r->fields != 0) add_solution(zone, r, "FlowSolution", r->fields);
+  if (r->second != 0) add_solution(zone, r, "Other", r->second);
+}
+
+static void write_file(const char *folder, const recipe *r)
+{
+  const float version      = 3.4F;
+  const int   dimension[2] = {3, 3};
+  char        path[4096];
+  double      root, base;
+
+  snprintf(path, sizeof path, "%s/%s.cgns", folder, r->name);
+  must(cgio_open_file(path, CGIO_MODE_WRITE, CGIO_FILE_HDF5, &file), path);
+  must(cgio_get_root_id(file, &root), path);
+  add_1d(root, "CGNSLibraryVersion", "CGNSLibraryVersion_t", "R4", 1, &version);
+  base = add_1d(root, "Base", "CGNSBase_t", "I4", 2, dimension);
+  add_zone(base, r, "Zone", r->low, r->high);
+  if (r->second_zone != 0) add_zone(base, r, "Second", r->second_zone, r->second_zone + r->high - r->low);
+  must(cgio_close_file(file), path);
+}
+
+int main(int argc, char **argv)
+{
+  if (argc != 2) {
+    fputs("usage: make_files DIR\n", stderr);
+    return 2;
+  }
+  for (size_t i = 0; i < sizeof recipes / sizeof *recipes; i++) write_file(argv[1], &recipes[i]);
+  return 0;
+}
