@@ -462,23 +462,77 @@ static bool polygons_cancel(const work *w, rm_lid i, const slot *s)
   return true;
 }
 
-/* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons has area and does not lie in a face of
- * that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not.) */
+/* Area shared by triangles a and b projected along axis k, by clipping one at the sides of the other; computed relative to o. */
+static double shared_area(const double *const a[3], const double *const b[3], int k, const double o[3])
+{
+  const int x = (k + 1) % 3, y = (k + 2) % 3;
+  double    loop[2][8][2], area = 0;
+  int       n = 3, from = 0;
+  double    c[3][2];
+
+  for (int h = 0; h < 3; h++) {
+    loop[0][h][0] = a[h][x] - o[x], loop[0][h][1] = a[h][y] - o[y];
+    c[h][0] = b[h][x] - o[x], c[h][1] = b[h][y] - o[y];
+  }
+  const double turn = (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]) < 0 ? -1 : 1;
+  for (int h = 0; h < 3; h++, from = 1 - from) {
+    const double *p = c[h], u[2] = {c[(h + 1) % 3][0] - p[0], c[(h + 1) % 3][1] - p[1]};
+    double      (*in)[2] = loop[from], (*out)[2] = loop[1 - from];
+    int           m = 0;
+    for (int i = 0; i < n; i++) {
+      const double *q = in[i], *r = in[(i + 1) % n];
+      const double  s = turn * (u[0] * (q[1] - p[1]) - u[1] * (q[0] - p[0])), t = turn * (u[0] * (r[1] - p[1]) - u[1] * (r[0] - p[0]));
+      if (s >= 0) out[m][0] = q[0], out[m][1] = q[1], m++;
+      if ((s > 0 && t < 0) || (s < 0 && t > 0)) {
+        const double l = s / (s - t);
+        out[m][0] = q[0] + l * (r[0] - q[0]), out[m][1] = q[1] + l * (r[1] - q[1]), m++;
+      }
+    }
+    n = m;
+  }
+  for (int i = 1; i + 1 < n; i++)
+    area += (loop[from][i][0] - loop[from][0][0]) * (loop[from][i + 1][1] - loop[from][0][1]) -
+            (loop[from][i][1] - loop[from][0][1]) * (loop[from][i + 1][0] - loop[from][0][0]);
+  return fabs(area) / 2;
+}
+
+/* Simulation of simplicity puts triangle t of mesh `mesh` on the inner side of the coplanar triangle b of the other mesh's cell. */
+static bool is_just_inside(const work *w, const rm_lid cell[2], int mesh, rm_lid t, rm_lid b)
+{
+  const rm_trimesh *other = w->o->mesh[1 - mesh];
+  const rm_lid     *v     = other->triangle[b];
+  const int         side  = rm_point_side(other->vertex[v[0]], other->vertex[v[1]], other->vertex[v[2]],
+                                          w->o->mesh[mesh]->vertex[w->o->mesh[mesh]->triangle[t][0]], mesh ? -1 : 1, NULL);
+  return other->side[b][0] == cell[1 - mesh] ? side < 0 : side > 0;
+}
+
+/* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons there has area beyond what lies in
+ * coplanar triangles of that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not make a cell
+ * partial. Where they are put just outside the cell they are no polygons of it; where just inside, their area is taken off.) */
 static bool skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
 {
   const rm_lid      cell[2] = {i, s->target};
-  const rm_trimesh *other = w->o->mesh[1 - mesh];
+  const rm_trimesh *own = w->o->mesh[mesh], *other = w->o->mesh[1 - mesh];
 
-  for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next) {
-    const polygon *g = &w->polygon[k];
-    bool           found = false;
+  for (int l = s->first_polygon; l >= 0; l = w->polygon[l].next) {
+    const polygon *g = &w->polygon[l];
+    const rm_lid   t = g->triangle;
+    const double  *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    const double  *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
+    int            k = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
 
-    if (g->mesh != mesh || !w->o->mesh[mesh]->triangle_is_skin[g->triangle] || !has_area(w, i, s, g)) continue;
-    for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1] && !found; a++) {
+    if (g->mesh != mesh || !own->triangle_is_skin[t] || !has_area(w, i, s, g)) continue;
+    if (fabs(n[2]) > fabs(n[k])) k = 2;
+    const double area = fabs(g->area) / 2 * fabs(n[k]) / square;
+    double       shared = 0;
+    for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1]; a++) {
       const rm_lid b = other->cell_triangle[a] / 2;
-      found = coplanar(w, mesh, g->triangle, 1 - mesh, b) && facing(w, cell, mesh, g->triangle, 1 - mesh, b) > 0;
+      if (!coplanar(w, mesh, t, 1 - mesh, b) || facing(w, cell, mesh, t, 1 - mesh, b) < 0) continue;
+      if (!is_just_inside(w, cell, mesh, t, b)) continue;
+      const double *c[3] = {other->vertex[other->triangle[b][0]], other->vertex[other->triangle[b][1]], other->vertex[other->triangle[b][2]]};
+      shared += shared_area(v, c, k, s->o);
     }
-    if (!found) return true;
+    if (shared == 0 || area - shared > 0x1p-40 * area) return true;
   }
   return false;
 }
