@@ -580,6 +580,63 @@ static void collapsed_hexahedra_are_welcome(void)
   }
 }
 
+static void a_closed_surface_is_a_mesh_of_one_cell(void)
+{
+  tm_mesh       *cube  = tm_hexahedra((int[]){20, 20, 20}, NULL, NULL);
+  rm_arena      *arena = rm_arena_new();
+  int64_t        num   = 0;
+  rm_frame       frame;
+  const rm_mesh *mesh;
+
+  for (int64_t f = 0; f < cube->view.num_faces; f++) { /* keep the faces of the cube's sides, all of one cell */
+    if (cube->neighbour[f] >= 0) continue;
+    memmove(cube->face_node + 4 * num, cube->face_node + 4 * f, 4 * sizeof *cube->face_node);
+    cube->owner[num]       = 0;
+    cube->neighbour[num++] = -1;
+  }
+  cube->view.num_faces = num;
+  cube->view.num_cells = 1;
+  mesh                 = build(arena, MPI_COMM_SELF, &cube->view, REMAP_FACES_CENTRE, &frame);
+  if (mesh) {
+    RT_EQ(mesh->num_faces, 6 * 400);
+    RT_EQ(mesh->num_nodes, 21 * 21 * 21 - 19 * 19 * 19);
+    RT_NEAR(mesh->cell_volume[0], 0.125, 0x1p-52);
+    for (int a = 0; a < 3; a++) RT_NEAR(mesh->cell_centroid[0][a], 0.25, 0x1p-52);
+  }
+  tm_free(cube);
+  rm_arena_drop(arena);
+}
+
+/* A box with two triangles inside of it, which lie on each other and look opposite ways. */
+static void a_wall_inside_a_cell_is_no_skin_and_takes_no_volume(void)
+{
+  tm_mesh       *box = row(1, (int[]){0}, (int[]){0}), *with = tm_new_(8, 8, 30, 1);
+  rm_arena      *arena   = rm_arena_new();
+  const int64_t  wall[6] = {0, 3, 7, 7, 3, 0};
+  rm_frame       frame;
+  const rm_mesh *mesh;
+
+  memcpy(with->xyz, box->xyz, 24 * sizeof(double));
+  memcpy(with->face_node, box->face_node, 24 * sizeof(int64_t));
+  memcpy(with->face_node + 24, wall, sizeof wall);
+  for (int f = 0; f < 8; f++) {
+    with->face_offset[f + 1] = f < 6 ? 4 * (f + 1) : 24 + 3 * (f - 5);
+    with->neighbour[f]       = -1;
+  }
+  mesh = build(arena, MPI_COMM_SELF, &with->view, REMAP_FACES_CENTRE, &frame);
+  if (mesh) {
+    RT_EQ(mesh->num_faces, 8);
+    for (int f = 0; f < 8; f++) {
+      RT_EQ(mesh->face_is_skin[f], f < 6);
+      RT_EQ(mesh->face_cell[f][1], -1);
+    }
+    RT_NEAR(mesh->cell_volume[0], 0.125, 0.0);
+  }
+  tm_free(box);
+  tm_free(with);
+  rm_arena_drop(arena);
+}
+
 static void cells_are_numbered_rank_after_rank_if_no_ids_are_given(void)
 {
   tm_mesh       *whole = tm_hexahedra((int[]){3, 3, 3}, NULL, NULL);
@@ -667,5 +724,6 @@ RT_MAIN(RT_CASE(cells_of_a_cube_fill_it_and_only_its_sides_are_skin),
         RT_CASE(those_of_a_thin_angle_do_not_suffer_from_its_empty_box),
         RT_CASE(a_flat_cell_has_no_volume_and_its_boxes_centre), RT_CASE(a_cell_one_ulp_thick_has_a_true_volume),
         RT_CASE(a_cell_turned_inside_out_has_negative_volume_and_is_counted), RT_CASE(collapsed_hexahedra_are_welcome),
+        RT_CASE(a_closed_surface_is_a_mesh_of_one_cell), RT_CASE(a_wall_inside_a_cell_is_no_skin_and_takes_no_volume),
         RT_CASE(cells_are_numbered_rank_after_rank_if_no_ids_are_given), RT_CASE(no_cells_at_all_make_an_empty_mesh),
         RT_CASE(a_check_finds_what_is_broken))

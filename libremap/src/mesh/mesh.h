@@ -17,7 +17,8 @@ typedef struct rm_frame {
 
 /* Read-only once built. Invariants:
  *   nodes are distinct in coordinates, and every one is used by a face;
- *   no loop repeats a node next to itself; loops have at least 3 nodes (faces that collapse to fewer are left out);
+ *   no loop repeats a node next to itself; loops have at least 3 distinct nodes (faces that collapse to fewer are left out,
+ *   but count for the boxes);
  *   a loop's normal points out of face_cell[f][0];
  *   every cell is closed: each of its edges is used as often one way as the other;
  *   faces of a cell are listed in ascending order. */
@@ -44,11 +45,15 @@ typedef struct rm_mesh {
  * counts: they are checked here before anything is read (NULL arrays, negative counts, offsets that do not ascend). */
 remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason);
 
-/* Check and convert one mesh. Collective. Volumes and centroids depend on coordinates alone, not on numbering. Faces meet across
- * ranks and zones by the coordinates of their nodes (an exchange by hash); two faces join if they run opposite ways; more than
- * two cells at one face within one zone is BAD_MESH, across zones all of these faces stay skin. Also BAD_MESH: index out of
- * range, a face with fewer than 3 nodes as given, an open cell, a cell without faces, duplicate or negative global ids, given by
- * some ranks only. The product lives in arena. O(n) time, about 40 bytes per face corner. */
+/* Check and convert one mesh. Collective. Volumes and centroids depend on coordinates alone, not on numbering. Only nodes that
+ * faces use count. Faces meet across ranks and zones by the coordinates of their nodes (an exchange by hash); two faces join if
+ * they run opposite ways: first within each zone, then what is left of all zones if it is two faces. More than two cells at one
+ * face within one zone is BAD_MESH, not counting cells of no thickness, which lie at it from both sides; across zones all of
+ * these faces stay skin. A face given with owner and neighbour stays as it is; two faces of one cell that lie on each other stay
+ * two, and are no skin. Also BAD_MESH: index out of range, a face with fewer than 3 nodes as given or with one cell on both
+ * sides, an open cell, a cell without faces as given, duplicate or negative global ids, ids given by some ranks only. TOO_LARGE:
+ * a count beyond rm_lid. The reason names the cell, the face and the remedy. The product lives in arena. O(n) time, about 60
+ * bytes per face corner, 20 of which stay. */
 remap_status rm_mesh_build(rm_arena *arena, const rm_comm *comm, remap_side side, const remap_mesh *given, const rm_frame *frame,
                            remap_faces faces, const rm_mesh **out, rm_reason *reason);
 
