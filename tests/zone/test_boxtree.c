@@ -109,9 +109,15 @@ static void check_queries(rm_arena *arena, rm_lid n, double (*box)[6], uint64_t 
     double (*query)[6] = make_boxes(kind, 8, seed + 100);
 
     for (int q = 0; q < 8; q++) {
+      bool meets = false;
+
       for (rm_lid i = 0; i < n; i++) found[i] = 0;
       RT_EQ(rm_boxtree_query(tree, (const double(*)[6])box, query[q], count_item, found), 0);
-      for (rm_lid i = 0; i < n; i++) RT_EQ(found[i], rm_box_meets(box[i], query[q]) ? 1 : 0);
+      for (rm_lid i = 0; i < n; i++) {
+        RT_EQ(found[i], rm_box_meets(box[i], query[q]) ? 1 : 0);
+        meets = meets || found[i];
+      }
+      RT_CHECK(rm_boxtree_meets(tree, (const double(*)[6])box, query[q]) == meets);
     }
     free(query);
   }

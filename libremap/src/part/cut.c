@@ -57,6 +57,7 @@ uint64_t rm_part_key(const rm_frame *zone_frame, const double box[6])
   return rm_morton(zone_frame, centre);
 }
 
+/* The keys of the zone's cells of one mesh, ascending. */
 static remap_status sort_keys(rm_arena *arena, const rm_frame *zone_frame, const rm_mesh *mesh, rm_lid num, const rm_lid *cell,
                               rm_keyed **out)
 {
@@ -97,6 +98,7 @@ static int64_t work_below(const keys *k, uint64_t key)
          (int64_t)num_below(k->keyed[REMAP_TARGET], k->num[REMAP_TARGET], key);
 }
 
+/* All that can fail on this rank alone: the sorted keys, and room for the search and for its result. */
 static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                             const rm_zone *zone, keys *k, search *s, rm_route *route)
 {
@@ -169,11 +171,13 @@ static void route_targets(const rm_comm *comm, const rm_zone *zone, const keys *
 remap_status rm_part_cut(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                          const rm_zone *zone, rm_route *out)
 {
-  keys     k     = {0};
-  search   s     = {0};
-  rm_route route = {0};
+  keys               k     = {0};
+  search             s     = {0};
+  rm_route           route = {0};
+  const remap_status mine  = prepare(arena, comm, zone_frame, mesh, zone, &k, &s, &route);
 
-  RM_TRY(rm_comm_agree(comm, prepare(arena, comm, zone_frame, mesh, zone, &k, &s, &route), NULL));
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
   RM_TRY(find_cuts(comm, &k, &s));
   route_targets(comm, zone, &k, &s, &route);
   *out = route;

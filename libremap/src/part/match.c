@@ -35,6 +35,7 @@ static remap_status send_boxes(rm_arena *arena, const rm_comm *comm, const rm_me
   return REMAP_OK;
 }
 
+/* The tree and the groups of this rank's targets. Not collective. */
 static remap_status group_targets(rm_arena *arena, const rm_comm *comm, targets *t, rm_reason *reason)
 {
   const int64_t num = t->recv_offset[comm->size];
@@ -56,6 +57,7 @@ typedef struct meeting {
   rm_lid     cell;      /* the one that asks                                                   */
 } meeting;
 
+/* A source cell meets a group: it meets the group's rank, which counts once however many of its groups it meets. */
 static int meet_rank(void *user, rm_lid item)
 {
   meeting   *m    = user;
@@ -68,6 +70,7 @@ static int meet_rank(void *user, rm_lid item)
   return 0;
 }
 
+/* Every source cell of the zone asks which groups it meets. */
 static void meet_all(const rm_comm *comm, const targets *t, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
 {
   for (int r = 0; r < comm->size; r++) m->last_cell[r] = -1;
@@ -77,7 +80,8 @@ static void meet_all(const rm_comm *comm, const targets *t, const rm_mesh *mesh,
   }
 }
 
-/* The source cells that meet a group of a rank's targets: counted in a first walk, listed in a second. */
+/* The source cells that meet a group of a rank's targets: counted in a first walk, listed in a second, so that the list needs
+ * no more room than it has entries. Not collective. */
 static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, targets *t,
                                     rm_route *route)
 {
@@ -105,20 +109,15 @@ static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const 
   return REMAP_OK;
 }
 
-static int stop_at_first(void *user, rm_lid item)
-{
-  (void)user, (void)item;
-  return 1;
-}
-
-/* For each of n boxes, whether it meets a target of this rank. Memory of answer and of the way back. */
+/* For each of n boxes, whether it meets a target of this rank; and room for the offsets of the answers that come back here.
+ * Not collective. */
 static remap_status answer_boxes(rm_arena *arena, const rm_comm *comm, const targets *t, int64_t n, const double (*box)[6],
                                  uint8_t **answer, int64_t **back_offset)
 {
   RM_NEW(*answer, arena, n);
   RM_NEW(*back_offset, arena, (int64_t)comm->size + 1);
   for (int64_t k = 0; k < n; k++)
-    (*answer)[k] = (uint8_t)rm_boxtree_query(t->tree, t->box, box[k], stop_at_first, NULL);
+    (*answer)[k] = rm_boxtree_meets(t->tree, t->box, box[k]);
   return REMAP_OK;
 }
 
@@ -141,13 +140,16 @@ static void keep_answered(const rm_comm *comm, rm_route *route, const uint8_t *a
 static remap_status ask(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const targets *t, rm_route *route)
 {
   const double (*box)[6];
-  int64_t       *recv_offset, *back_offset = NULL;
+  int64_t       *asked_offset, *back_offset = NULL; /* [comm->size + 1] of what comes to be answered, and of the answers */
   uint8_t       *answer = NULL;
   void          *answers;
+  remap_status   mine;
 
-  RM_TRY(send_boxes(arena, comm, mesh, route, &recv_offset, &box));
-  RM_TRY(rm_comm_agree(comm, answer_boxes(arena, comm, t, recv_offset[comm->size], box, &answer, &back_offset), NULL));
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *answer, recv_offset, answer, back_offset, &answers));
+  RM_TRY(send_boxes(arena, comm, mesh, route, &asked_offset, &box));
+  mine = answer_boxes(arena, comm, t, asked_offset[comm->size], box, &answer, &back_offset);
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *answer, asked_offset, answer, back_offset, &answers));
   RM_ASSERT(back_offset[comm->size] == route->offset[comm->size]);
   keep_answered(comm, route, answers);
   return REMAP_OK;
@@ -160,12 +162,17 @@ remap_status rm_part_match(rm_arena *arena, const rm_comm *comm, const rm_mesh *
   targets        t     = {0};
   rm_route       route = {0};
   void          *group;
+  remap_status   mine;
 
   RM_TRY(send_boxes(arena, comm, mesh[REMAP_TARGET], target, &t.recv_offset, &t.box));
-  RM_TRY(rm_comm_agree_reason(comm, group_targets(arena, comm, &t, reason), reason));
+  mine = group_targets(arena, comm, &t, reason);
+  RM_TRY(rm_comm_agree_reason(comm, mine, reason));
+  RM_ASSERT(mine == REMAP_OK && t.group_offset);
   RM_TRY(rm_comm_allgatherv(comm, arena, t.mine, t.num_mine, sizeof *t.mine, t.group_offset, &group));
   t.group = group;
-  RM_TRY(rm_comm_agree(comm, list_candidates(arena, comm, source, zone, &t, &route), NULL));
+  mine    = list_candidates(arena, comm, source, zone, &t, &route);
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
   RM_TRY(ask(arena, comm, source, &t, &route));
   *out = route;
   return REMAP_OK;

@@ -48,6 +48,7 @@ done:
   return status;
 }
 
+/* Every number is in its range, a skin face has one cell, and cells ascend by sender and the sender's numbering. */
 static bool numbers_are_right(const rm_piece *p)
 {
   if (p->num_nodes < 0 || p->num_faces < 0 || p->num_cells < 0 || p->face_offset[0] != 0) return false;
@@ -109,6 +110,7 @@ static bool cells_are_closed(const rm_piece *p, uint64_t *sum, uint8_t *has_face
   return true;
 }
 
+/* Every invariant of rm_piece. */
 static remap_status check_piece(rm_arena *scratch, const rm_piece *p)
 {
   uint8_t  *node_is_used, *has_face;

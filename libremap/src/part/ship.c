@@ -18,7 +18,14 @@ typedef struct wire_cell {
   double  volume, centroid[3];
 } wire_cell;
 
-/* A parcel for, or from, every rank, one after the other. The cells' offsets stand beside it. */
+/* A parcel for, or from, every rank, one after the other; each array is cut at its offsets:
+ *
+ *     parcel of rank      0              1        2 (empty)  3
+ *     node     | 0 1 2 3 4 5 ... | 0 1 2 3 ... |  |  0 1 ...    numbered from 0 in each
+ *     face     | corners and cells by those numbers | ...
+ *
+ * so that joining what arrives is adding the offset of a parcel's first node and cell. The offsets of cells stand beside it:
+ * they are the route's on the way out. */
 typedef struct parcels {
   int64_t   *node_offset, *face_offset, *corner_offset; /* [comm->size + 1]                             */
   double   (*node)[3];                                  /* [node_offset[comm->size]]                    */
@@ -39,11 +46,13 @@ typedef struct packing {
   parcels         out;
 } packing;
 
+/* Number of nodes of a face of the mesh. */
 static int64_t loop_length(const rm_mesh *mesh, rm_lid face)
 {
   return mesh->face_offset[face + 1] - mesh->face_offset[face];
 }
 
+/* Places of entities of which none is in a parcel yet. */
 static remap_status new_places(rm_arena *scratch, rm_lid num, int64_t **out)
 {
   RM_NEW(*out, scratch, num);
@@ -121,6 +130,7 @@ static void pack_face(packing *p, int r, rm_lid f, wire_face *face, rm_lid *corn
   }
 }
 
+/* Write a mesh cell to a parcel. */
 static void pack_cell(const rm_mesh *mesh, rm_lid c, wire_cell *cell)
 {
   cell->global = mesh->cell_global[c];
@@ -158,7 +168,7 @@ static remap_status pack_entities(rm_arena *scratch, packing *p)
   return REMAP_OK;
 }
 
-/* Not collective. */
+/* Fill all parcels. Not collective. */
 static remap_status pack(rm_arena *scratch, packing *p)
 {
   RM_TRY(new_offsets(scratch, p->num_ranks, &p->out));
@@ -173,7 +183,7 @@ static remap_status pack(rm_arena *scratch, packing *p)
   return REMAP_OK;
 }
 
-/* Collective. Nodes and corners arrive where they stay. */
+/* Send and receive all parcels. Nodes and corners arrive where they stay. Collective. */
 static remap_status exchange(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_route *route, const parcels *out,
                              parcels *in, int64_t *in_cell_offset)
 {
@@ -224,6 +234,7 @@ static remap_status join_faces(rm_arena *arena, int num_ranks, const parcels *in
   return REMAP_OK;
 }
 
+/* The cells of a piece, taken apart into its arrays. The sender is the rank of their home. */
 static remap_status join_cells(rm_arena *arena, int num_ranks, const parcels *in, const int64_t *cell_offset, rm_piece *piece)
 {
   const int64_t num = cell_offset[num_ranks];
@@ -283,12 +294,14 @@ static remap_status prepare(rm_arena *scratch, packing *p, parcels *in, int64_t 
 remap_status rm_part_ship(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
                           rm_piece *out, rm_reason *reason)
 {
-  packing  p     = {.mesh = mesh, .route = route, .num_ranks = comm->size};
-  parcels  in    = {0};
-  rm_piece piece = {0};
-  int64_t *in_cell_offset = NULL;
+  packing            p              = {.mesh = mesh, .route = route, .num_ranks = comm->size};
+  parcels            in             = {0};
+  rm_piece           piece          = {0};
+  int64_t           *in_cell_offset = NULL;
+  const remap_status mine           = prepare(scratch, &p, &in, &in_cell_offset);
 
-  RM_TRY(rm_comm_agree(comm, prepare(scratch, &p, &in, &in_cell_offset), NULL));
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
   RM_TRY(exchange(arena, scratch, comm, route, &p.out, &in, in_cell_offset));
   RM_TRY(rm_comm_agree_reason(comm, join(arena, comm, mesh->side, &in, in_cell_offset, &piece, reason), reason));
   *out = piece;

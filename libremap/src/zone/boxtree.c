@@ -211,3 +211,14 @@ int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const 
   }
   return 0;
 }
+
+static int stop(void *user, rm_lid item)
+{
+  (void)user, (void)item;
+  return 1;
+}
+
+bool rm_boxtree_meets(const rm_boxtree *tree, const double (*item_box)[6], const double box[6])
+{
+  return rm_boxtree_query(tree, item_box, box, stop, NULL) != 0;
+}

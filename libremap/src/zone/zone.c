@@ -11,6 +11,7 @@ typedef struct groups {
   const double (*box)[6]; /* [offset[comm->size]] */
 } groups;
 
+/* This rank's groups of both meshes. Not collective. */
 static remap_status group(rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2], groups *all)
 {
   for (int side = 0; side < 2; side++) {
@@ -20,10 +21,9 @@ static remap_status group(rm_arena *scratch, const rm_comm *comm, const rm_mesh 
   return REMAP_OK;
 }
 
-/* Collective. Local failures so far come in as mine. */
-static remap_status gather(rm_arena *scratch, const rm_comm *comm, remap_status mine, groups *all)
+/* Everybody's groups of both meshes. Collective. */
+static remap_status gather(rm_arena *scratch, const rm_comm *comm, groups *all)
 {
-  RM_TRY(rm_comm_agree(comm, mine, NULL));
   for (int side = 0; side < 2; side++) {
     groups *g = &all[side];
     void   *box;
@@ -34,13 +34,8 @@ static remap_status gather(rm_arena *scratch, const rm_comm *comm, remap_status 
   return REMAP_OK;
 }
 
-static int stop_at_first(void *user, rm_lid item)
-{
-  (void)user, (void)item;
-  return 1;
-}
-
-/* List the cells of mesh that meet one of the n boxes. */
+/* List the cells of mesh that meet one of the n boxes. How many they are is known only afterwards: they are collected in
+ * scratch and then copied. Not collective. */
 static remap_status list_cells(rm_arena *arena, rm_arena *scratch, const rm_mesh *mesh, int64_t n, const double (*box)[6],
                                rm_lid *num_cells, const rm_lid **cell)
 {
@@ -51,7 +46,7 @@ static remap_status list_cells(rm_arena *arena, rm_arena *scratch, const rm_mesh
   RM_TRY(rm_boxtree_build(scratch, (rm_lid)n, box, &tree));
   RM_NEW(found, scratch, mesh->num_cells);
   for (rm_lid c = 0; c < mesh->num_cells; c++)
-    if (rm_boxtree_query(tree, box, mesh->cell_box[c], stop_at_first, NULL)) found[num++] = c;
+    if (rm_boxtree_meets(tree, box, mesh->cell_box[c])) found[num++] = c;
   RM_NEW(list, arena, num);
   for (rm_lid k = 0; k < num; k++) list[k] = found[k];
   *num_cells = num;
@@ -59,6 +54,7 @@ static remap_status list_cells(rm_arena *arena, rm_arena *scratch, const rm_mesh
   return REMAP_OK;
 }
 
+/* The zone: each mesh's cells against the other mesh's groups. Not collective. */
 static remap_status list_both(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
                               const groups *all, const rm_zone **out)
 {
@@ -79,12 +75,15 @@ remap_status rm_zone_build(rm_arena *arena, const rm_comm *comm, const rm_mesh *
 {
   rm_arena      *scratch = rm_arena_new();
   const rm_zone *zone    = NULL;
-  groups         all[2];
-  remap_status   status;
+  groups         all[2]  = {{.num_mine = 0}, {.num_mine = 0}};
+  remap_status   mine    = scratch ? group(scratch, comm, mesh, all) : REMAP_NO_MEMORY, status;
 
-  RM_GOTO(done, status = gather(scratch, comm, scratch ? group(scratch, comm, mesh, all) : REMAP_NO_MEMORY, all));
-  RM_GOTO(done, status = rm_comm_agree(comm, list_both(arena, scratch, comm, mesh, all, &zone), NULL));
-  RM_ASSERT(rm_zone_check(zone, mesh) != REMAP_INTERNAL);
+  RM_GOTO(done, status = rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
+  RM_GOTO(done, status = gather(scratch, comm, all));
+  mine = list_both(arena, scratch, comm, mesh, all, &zone);
+  RM_GOTO(done, status = rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK && rm_zone_check(zone, mesh) != REMAP_INTERNAL);
   *out = zone;
 done:
   rm_arena_drop(scratch);
@@ -104,7 +103,7 @@ static remap_status check_side(rm_arena *scratch, const rm_zone *zone, int side,
 
     RM_REQUIRE(listed >= next && (k == zone->num_cells[side] || listed < mesh->num_cells), REMAP_INTERNAL);
     for (; next < listed; next++)
-      RM_REQUIRE(!rm_boxtree_query(tree, other->cell_box, mesh->cell_box[next], stop_at_first, NULL), REMAP_INTERNAL);
+      RM_REQUIRE(!rm_boxtree_meets(tree, other->cell_box, mesh->cell_box[next]), REMAP_INTERNAL);
     next = listed + 1;
   }
   return REMAP_OK;

@@ -30,6 +30,9 @@ remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6],
 int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
                      int (*visit)(void *user, rm_lid item), void *user);
 
+/* True if some item's own box meets `box`. O(log n) mostly. */
+bool rm_boxtree_meets(const rm_boxtree *tree, const double (*item_box)[6], const double box[6]);
+
 /* The boxes of at most RM_ZONE_BOXES groups of neighbouring items that together hold all n boxes: group is [RM_ZONE_BOXES][6],
  * *num_groups is 0 only if n is. Not collective. Working memory from scratch. O(n log RM_ZONE_BOXES). */
 remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], double (*group)[6], int *num_groups);
