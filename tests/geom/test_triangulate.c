@@ -280,6 +280,30 @@ static void warped_faces_are_fans_about_their_mean(void)
   RT_CHECK(quads > 0);
 }
 
+static void the_centre_stays_in_the_box_of_the_face(void)
+{
+  random_state rnd = {77};
+  int          centres = 0, outside = 0;
+  double       xyz[MAX_N][3];
+  result       r;
+
+  for (int round = 0; round < ROUNDS; round++) {
+    const double level = random_unit(&rnd);
+
+    for (int i = 0; i < 7; i++) { /* flat, but for the last bit of x */
+      xyz[i][0] = random_below(&rnd, 2) ? level : nextafter(level, 2);
+      xyz[i][1] = cos(i * 0.8975979);
+      xyz[i][2] = sin(i * 0.8975979);
+    }
+    triangulate(xyz, 7, REMAP_FACES_CENTRE, &r);
+    if (!uses_centre(&r)) continue;
+    centres++;
+    outside += r.centre[0] < level || r.centre[0] > nextafter(level, 2);
+  }
+  RT_CHECK(centres > ROUNDS / 4);
+  RT_EQ(outside, 0);
+}
+
 static void a_quadrangle_is_cut_along_its_shorter_diagonal(void)
 {
   double kite[4][3]   = {{0, 0, 0}, {3, -1, 0}, {4, 0, 0.5}, {3, 1, 0}};
@@ -376,6 +400,7 @@ static void faces_without_area_are_covered_by_triangles_without_area(void)
 RT_MAIN(RT_CASE(triangles_depend_on_neither_start_nor_direction_of_the_loop),
         RT_CASE(the_boundary_of_the_triangles_is_the_loop),
         RT_CASE(flat_faces_take_two_triangles_less_than_vertices_and_cover_them_once),
-        RT_CASE(warped_faces_are_fans_about_their_mean), RT_CASE(a_quadrangle_is_cut_along_its_shorter_diagonal),
+        RT_CASE(warped_faces_are_fans_about_their_mean), RT_CASE(the_centre_stays_in_the_box_of_the_face),
+        RT_CASE(a_quadrangle_is_cut_along_its_shorter_diagonal),
         RT_CASE(a_concave_quadrangle_is_cut_inside), RT_CASE(hanging_vertices_stay_corners_and_lie_on_no_diagonal),
         RT_CASE(repeated_vertices_vanish), RT_CASE(faces_without_area_are_covered_by_triangles_without_area))

@@ -175,11 +175,20 @@ static bool fan(sink *out, const face_parts *face, double centre[3])
 {
   const double(*xyz)[3] = out->xyz;
   const int first       = out->num;
-  double    area[3] = {0, 0, 0}, sum[3] = {0, 0, 0};
+  double    area[3] = {0, 0, 0};
 
-  for (int i = 0; i < face->total; i++)
-    for (int k = 0; k < 3; k++) sum[k] += xyz[face->vertex[i]][k];
-  for (int k = 0; k < 3; k++) centre[k] = sum[k] / face->total;
+  for (int k = 0; k < 3; k++) {
+    double sum = 0, low = xyz[face->vertex[0]][k], high = low;
+
+    for (int i = 0; i < face->total; i++) {
+      const double x = xyz[face->vertex[i]][k];
+      sum += x;
+      low  = x < low ? x : low;
+      high = x > high ? x : high;
+    }
+    sum /= face->total; /* rounding must not take it out of the face's box, by which cells are told to be apart */
+    centre[k] = sum < low ? low : sum > high ? high : sum;
+  }
   for (int p = 0, from = 0; p < face->num; from += face->size[p++]) {
     double part_area[3];
 
