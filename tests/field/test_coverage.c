@@ -30,13 +30,23 @@ static void open_job(job *j, tm_mesh *source, tm_mesh *target, tm_dealing deal)
   for (rm_lid c = 0; c < j->w.mesh[1]->num_cells; c++) j->out[c] = 10.0;
 }
 
+static rm_transfer_setup setup_of(const boxes_world *w)
+{
+  return (rm_transfer_setup){.comm              = &w->comm,
+                             .frame             = &w->frame,
+                             .giving            = w->mesh[0],
+                             .receiving         = w->mesh[1],
+                             .rows              = &w->mapping->rows[1],
+                             .giving_rows       = &w->mapping->rows[0],
+                             .giving_stencil    = w->stencil[0],
+                             .receiving_stencil = w->stencil[1]};
+}
+
 static remap_status run(job *j)
 {
-  const boxes_world      *w     = &j->w;
-  const rm_transfer_setup setup = {
-      &w->comm, &w->frame, w->mesh[0], w->mesh[1], &w->mapping->rows[1], &w->mapping->rows[0], w->stencil[0], w->stencil[1]};
-  rm_arena          *arena  = rm_arena_new();
-  const remap_status status = rm_field_transfer(arena, &setup, &j->how, 1, &j->field, &j->report, &j->reason);
+  const rm_transfer_setup setup  = setup_of(&j->w);
+  rm_arena               *arena  = rm_arena_new();
+  const remap_status      status = rm_field_transfer(arena, &setup, &j->how, 1, &j->field, &j->report, &j->reason);
 
   rm_arena_drop(arena);
   return status;
@@ -312,6 +322,35 @@ static void old_values_are_checked_where_they_are_kept_and_nowhere_else(void)
   }
 }
 
+/* The last rank's n-th allocation fails, for every n there is: all ranks say so, none waits for another, nothing is written. */
+static void memory_that_runs_out_on_one_rank_fails_on_all(void)
+{
+  job          j;
+  remap_status status = REMAP_NO_MEMORY;
+  int          n      = 0;
+
+  open_job(&j, source_up_to(1.1), long_target(), TM_SLABS);
+  j.how.on_uncovered = REMAP_UNCOVERED_NEAREST;
+  while (status == REMAP_NO_MEMORY && n < 100) {
+    const boxes_world      *w     = &j.w;
+    const rm_transfer_setup setup = setup_of(w);
+    rm_arena               *arena = rm_arena_new();
+    const rm_stencil       *stencil;
+
+    n++;
+    if (rt_rank() == rt_size() - 1) rm_arena_fail_at(arena, n);
+    status = rm_stencil_build(arena, &w->comm, &w->frame, w->mesh[0], &stencil);
+    if (status == REMAP_OK) status = rm_field_transfer(arena, &setup, &j.how, 1, &j.field, &j.report, &j.reason);
+    if (!rt_all(RT_CHECK(status == REMAP_NO_MEMORY || status == REMAP_OK))) n = 100;
+    if (status != REMAP_OK)
+      for (rm_lid c = 0; c < w->mesh[1]->num_cells; c++) RT_NEAR(j.out[c], 10.0, 0.0);
+    rm_arena_drop(arena);
+  }
+  RT_EQ(status, REMAP_OK);
+  RT_CHECK(n > 20);
+  boxes_close(&j.w);
+}
+
 RT_MAIN(RT_CASE(uncovered_cells_keep_what_they_had), RT_CASE(uncovered_cells_are_filled),
         RT_CASE(partly_covered_cells_follow_the_policy), RT_CASE(blending_conserves_the_sum_of_both),
         RT_CASE(coverage_errors_reach_every_rank_and_write_nothing), RT_CASE(covered_meshes_pass_the_error_policies),
@@ -319,4 +358,5 @@ RT_MAIN(RT_CASE(uncovered_cells_keep_what_they_had), RT_CASE(uncovered_cells_are
         RT_CASE(nearest_reaches_parts_of_the_mesh_that_touch_no_mapped_cell), RT_CASE(the_search_finds_what_brute_force_finds),
         RT_CASE(meshes_that_do_not_meet_have_no_nearest_cell), RT_CASE(flags_come_from_the_largest_overlap),
         RT_CASE(values_that_are_not_finite_are_refused_on_every_rank_by_name_and_cell),
-        RT_CASE(old_values_are_checked_where_they_are_kept_and_nowhere_else))
+        RT_CASE(old_values_are_checked_where_they_are_kept_and_nowhere_else),
+        RT_CASE(memory_that_runs_out_on_one_rank_fails_on_all))

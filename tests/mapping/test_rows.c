@@ -171,7 +171,31 @@ static void look_at_bits(boxes_world *w, int kind)
 }
 static void rows_are_those_of_one_rank_bit_by_bit(void) { for_all_worlds(look_at_bits); }
 
+/* The last rank's n-th allocation fails, for every n there is: all ranks say so, and none waits for another. */
+static void memory_that_runs_out_on_one_rank_fails_on_all(void)
+{
+  boxes_world  w;
+  remap_status status = REMAP_NO_MEMORY;
+  int          n      = 0;
+
+  boxes_open(&w, MPI_COMM_WORLD, make(STICKS_OUT, 0), make(STICKS_OUT, 1), TM_SLABS);
+  while (status == REMAP_NO_MEMORY && n < 100) {
+    rm_arena         *arena = rm_arena_new();
+    const rm_mapping *mapping;
+    rm_reason         reason = {-1, -1, ""};
+
+    n++;
+    if (rt_rank() == rt_size() - 1) rm_arena_fail_at(arena, n);
+    status = rm_mapping_build(arena, &w.comm, &w.frame, w.mesh, &w.part, &w.moments, &mapping, &reason);
+    if (!rt_all(RT_CHECK(status == REMAP_NO_MEMORY || status == REMAP_OK))) n = 100;
+    rm_arena_drop(arena);
+  }
+  RT_EQ(status, REMAP_OK);
+  RT_CHECK(n > 20);
+  boxes_close(&w);
+}
+
 RT_MAIN(RT_CASE(every_invariant_holds), RT_CASE(rows_of_covered_cells_add_up_to_the_cell),
         RT_CASE(both_ways_hold_the_same_pairs_and_every_cell_has_a_cover), RT_CASE(pairs_are_the_same_on_identical_meshes_only),
         RT_CASE(a_cell_inside_of_another_is_not_the_same), RT_CASE(the_plan_brings_the_givers_listed),
-        RT_CASE(rows_are_those_of_one_rank_bit_by_bit))
+        RT_CASE(rows_are_those_of_one_rank_bit_by_bit), RT_CASE(memory_that_runs_out_on_one_rank_fails_on_all))

@@ -19,6 +19,8 @@ typedef struct boxes_world {
   rm_arena         *arena; /* of everything, and free for the caller's scratch */
   rm_frame          frame;
   const rm_mesh    *mesh[2];
+  rm_part           part; /* without faces */
+  rm_moments        moments;
   const rm_mapping *mapping;
   const rm_stencil *stencil[2];
 } boxes_world;
@@ -206,14 +208,12 @@ static inline void boxes_open_meshes(boxes_world *world, MPI_Comm comm, tm_mesh 
 
 static inline void boxes_open(boxes_world *world, MPI_Comm comm, tm_mesh *source, tm_mesh *target, tm_dealing deal)
 {
-  rm_reason  reason = {-1, -1, ""};
-  rm_part    part;
-  rm_moments moments;
+  rm_reason reason = {-1, -1, ""};
 
   boxes_open_meshes(world, comm, source, target, deal);
-  memset(&part, 0, sizeof part);
-  boxes_overlay_(world, &part, &moments);
-  RT_EQ(rm_mapping_build(world->arena, &world->comm, &world->frame, world->mesh, &part, &moments, &world->mapping, &reason),
+  boxes_overlay_(world, &world->part, &world->moments);
+  RT_EQ(rm_mapping_build(world->arena, &world->comm, &world->frame, world->mesh, &world->part, &world->moments, &world->mapping,
+                         &reason),
         REMAP_OK);
 }
 

@@ -104,12 +104,11 @@ remap_status rm_reconstruct(rm_arena *arena, const rm_transfer_setup *setup, int
 
   for (int f = 0; f < num_fields; f++) has_slopes |= packing->order[f] > 1;
   if (has_slopes) RM_TRY(fetch_halo(arena, setup, num_fields, fields, &halo));
-  for (int f = 0; f < num_fields; f++) {
-    const around u = {fields[f].in, halo ? halo + f : NULL, num_fields, packing->scale[f]};
-
-    limited[f] = 0;
-    for (rm_lid c = 0; c < mesh->num_cells; c++) {
-      double *place = pack + (int64_t)c * packing->width + packing->at[f];
+  for (int f = 0; f < num_fields; f++) limited[f] = 0;
+  for (rm_lid c = 0; c < mesh->num_cells; c++) /* cells first: their weights are read once for all fields */
+    for (int f = 0; f < num_fields; f++) {
+      const around u     = {fields[f].in, halo ? halo + f : NULL, num_fields, packing->scale[f]};
+      double      *place = pack + (int64_t)c * packing->width + packing->at[f];
 
       place[0] = fields[f].in[c];
       if (packing->order[f] < 2) continue;
@@ -120,6 +119,5 @@ remap_status rm_reconstruct(rm_arena *arena, const rm_transfer_setup *setup, int
       }
       for (int k = RM_PACK_SLOPE; k < (packing->has_bounds ? 6 : 4); k++) place[k] = 0.0; /* nobody asks for this cell */
     }
-  }
   return REMAP_OK;
 }

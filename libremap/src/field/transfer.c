@@ -307,30 +307,32 @@ static double receive_flag(const work *w, int f, rm_lid cell)
   return w->got[(int64_t)rows->giver[best] * w->packing.width + w->packing.at[f]];
 }
 
-/* Fill value[f]; cells that take the nearest value are left out. */
-static void receive_field(work *w, int f)
+/* The new value of a cell; one that takes the nearest value gets it later. */
+static double receive(const work *w, int f, rm_lid cell)
 {
   const rm_rows          *rows     = w->setup->rows;
-  const rm_mesh          *mesh     = w->setup->receiving;
   const remap_field_desc *field    = &w->fields[f];
+  const int64_t           first    = rows->offset[cell];
   const double            scale    = w->packing.scale[f];
-  double                 *value    = w->value + (int64_t)f * mesh->num_cells;
   rm_integral            *integral = w->integral ? &w->integral[f] : NULL;
+  double                  copied;
 
-  for (rm_lid c = 0; c < mesh->num_cells; c++) {
-    const int64_t first = rows->offset[c];
+  if (rows->cover[cell] == REMAP_UNCOVERED)
+    return keeps_old(w, field, rows->cover[cell]) ? field->out[cell] : w->how->fill_value;
+  if (field->nature == REMAP_FLAG) return receive_flag(w, f, cell);
+  if (!rows->same[first]) return receive_cell(w, f, cell, integral) / scale;
+  copied = w->got[(int64_t)rows->giver[first] * w->packing.width + w->packing.at[f]];
+  if (integral) rm_integral_add(&integral->minus_target, -scale * copied, w->setup->receiving->cell_volume[cell]);
+  return copied;
+}
 
-    if (rows->cover[c] == REMAP_UNCOVERED) {
-      value[c] = keeps_old(w, field, rows->cover[c]) ? field->out[c] : w->how->fill_value;
-    } else if (field->nature == REMAP_FLAG) {
-      value[c] = receive_flag(w, f, c);
-    } else if (rows->same[first]) {
-      value[c] = w->got[(int64_t)rows->giver[first] * w->packing.width + w->packing.at[f]];
-      if (integral) rm_integral_add(&integral->minus_target, -scale * value[c], mesh->cell_volume[c]);
-    } else {
-      value[c] = receive_cell(w, f, c, integral) / scale;
-    }
-  }
+/* All fields of a cell in turn: its row is read once for all of them. */
+static void receive_all(work *w)
+{
+  const rm_lid n = w->setup->receiving->num_cells;
+
+  for (rm_lid c = 0; c < n; c++)
+    for (int f = 0; f < w->num_fields; f++) w->value[(int64_t)f * n + c] = receive(w, f, c);
 }
 
 /* ---- nearest --------------------------------------------------------------------------------------------------- */
@@ -419,10 +421,8 @@ remap_status rm_field_transfer(rm_arena *arena, const rm_transfer_setup *setup, 
 
   RM_TRY(check(&w, reports != NULL, reason));
   RM_TRY(travel(&w));
-  for (int f = 0; f < num_fields; f++) {
-    receive_field(&w, f);
-    any_nearest |= needs_nearest(&w, &fields[f]);
-  }
+  receive_all(&w);
+  for (int f = 0; f < num_fields; f++) any_nearest |= needs_nearest(&w, &fields[f]);
   if (any_nearest && answer(&w, HAS_UNCOVERED)) RM_TRY(take_nearest(&w, reason));
   if (answer(&w, WANTS_REPORTS)) RM_TRY(report(&w, reports));
   for (int f = 0; f < num_fields; f++)
