@@ -322,6 +322,40 @@ static void old_values_are_checked_where_they_are_kept_and_nowhere_else(void)
   }
 }
 
+/* As many overlaps count against a cell as for it, as where a mesh is tangled: the volumes cancel, yet a value comes out, within
+ * those given. */
+static void volumes_that_cancel_leave_finite_values(void)
+{
+  job               j;
+  double           *volume, (*moment)[3];
+  uint8_t          *flags;
+  rm_moments        moments;
+  const rm_mapping *mapping;
+
+  open_job(&j, boxes_grid(12, 1, 1, (boxes_shape){{0, 0, 0}, {3, 1, 1}, 0}), long_target(), TM_SLABS);
+  moments = j.w.moments;
+  volume  = rm_arena_alloc(j.w.arena, moments.num_pairs, sizeof *volume);
+  moment  = rm_arena_alloc(j.w.arena, moments.num_pairs, sizeof *moment);
+  flags   = rm_arena_alloc(j.w.arena, moments.num_pairs, sizeof *flags);
+  for (int64_t k = 0; k < moments.num_pairs; k++) {
+    const double sign = j.w.part.piece[0].cell_global[moments.source[k]] % 2 ? -1.0 : 1.0;
+
+    volume[k] = sign * moments.volume[k];
+    for (int d = 0; d < 3; d++) moment[k][d] = sign * moments.moment[k][d];
+    flags[k] = RM_PAIR_SOURCE_SKIN | RM_PAIR_TARGET_SKIN;
+  }
+  moments.volume = volume;
+  moments.moment = (const double(*)[3])moment;
+  moments.flags  = flags;
+  RT_EQ(rm_mapping_build(j.w.arena, &j.w.comm, &j.w.frame, j.w.mesh, &j.w.part, &moments, &mapping, &j.reason), REMAP_OK);
+  j.w.mapping = mapping;
+  for (rm_lid c = 0; c < j.w.mesh[0]->num_cells; c++) j.in[c] = (double)j.w.mesh[0]->cell_global[c];
+  j.how.on_partial = REMAP_PARTIAL_NORMALISE;
+  RT_EQ(run(&j), REMAP_OK);
+  for (rm_lid c = 0; c < j.w.mesh[1]->num_cells; c++) RT_NEAR(j.out[c], 2.0 * layer(&j, c) + 0.5, 1e-13);
+  boxes_close(&j.w);
+}
+
 /* The last rank's n-th allocation fails, for every n there is: all ranks say so, none waits for another, nothing is written. */
 static void memory_that_runs_out_on_one_rank_fails_on_all(void)
 {
@@ -358,5 +392,5 @@ RT_MAIN(RT_CASE(uncovered_cells_keep_what_they_had), RT_CASE(uncovered_cells_are
         RT_CASE(nearest_reaches_parts_of_the_mesh_that_touch_no_mapped_cell), RT_CASE(the_search_finds_what_brute_force_finds),
         RT_CASE(meshes_that_do_not_meet_have_no_nearest_cell), RT_CASE(flags_come_from_the_largest_overlap),
         RT_CASE(values_that_are_not_finite_are_refused_on_every_rank_by_name_and_cell),
-        RT_CASE(old_values_are_checked_where_they_are_kept_and_nowhere_else),
+        RT_CASE(old_values_are_checked_where_they_are_kept_and_nowhere_else), RT_CASE(volumes_that_cancel_leave_finite_values),
         RT_CASE(memory_that_runs_out_on_one_rank_fails_on_all))
