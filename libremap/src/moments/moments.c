@@ -64,6 +64,8 @@ typedef struct polygon {
   rm_lid  triangle;
   int32_t num_cones;
   double  area; /* twice, times the normal's magnitude, outward or not as the cones' signs say */
+  double  first[3]; /* one of its vertices, relative to the pair's origin */
+  double  reach;    /* largest distance of the others from it, by any one coordinate */
 } polygon;
 
 typedef struct work {
@@ -170,9 +172,10 @@ INLINE void add_cone_2(work *w, rm_lid i, rm_lid j, int kind, double sign, const
 /* The polygon's area, for pairs that are in doubt. */
 static void add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
 {
-  slot    *s = &w->slots[w->slot_of[j]];
-  double   a[3], b[3], height;
-  polygon *g = NULL;
+  slot         *s = &w->slots[w->slot_of[j]];
+  const double *n = pl->n;
+  double        a[3], b[3];
+  polygon      *g = NULL;
 
   (void)i, (void)kind;
   if (s->first_polygon == -1 || w->status != REMAP_OK) return;
@@ -181,15 +184,20 @@ static void add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, cons
       g = &w->polygon[k];
       break;
     }
+  relative(p, s->o, a);
+  relative(q, s->o, b);
   if (!g) {
     if ((w->status = rm_grow(&w->polygon, &w->polygon_room, w->num_polygons + 1, sizeof *w->polygon)) != REMAP_OK) return;
     g  = &w->polygon[w->num_polygons];
-    *g = (polygon){s->first_polygon, pl->mesh, pl->triangle, 0, 0};
+    *g = (polygon){s->first_polygon, pl->mesh, pl->triangle, 0, 0, {a[0], a[1], a[2]}, 0};
     s->first_polygon = w->num_polygons++;
   }
-  relative(p, s->o, a);
-  relative(q, s->o, b);
-  g->area += sign * side_area(s, pl, a, b, &height);
+  for (int c = 0; c < 3; c++) {
+    a[c] -= g->first[c];
+    b[c] -= g->first[c];
+    g->reach = fmax(g->reach, fmax(fabs(a[c]), fabs(b[c])));
+  }
+  g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
   g->num_cones++;
 }
 
@@ -415,12 +423,12 @@ static double volume_noise(const work *w, rm_lid i, const slot *s)
   return 0x1p-46 * (s->num_cones + 1) * s->reach * s->reach * operand_extent(w, i, s);
 }
 
-/* The polygon has area beyond rounding. */
+/* The polygon has area beyond rounding: its points err by 4 extents, in units of u, however small it is itself. */
 static bool has_area(const work *w, rm_lid i, const slot *s, const polygon *g)
 {
   const double *n = w->o->mesh[g->mesh]->normal[g->triangle];
   const double  length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  return fabs(g->area) > 0x1p-47 * (g->num_cones + 1) * s->reach * operand_extent(w, i, s) * length;
+  return fabs(g->area) > 0x1p-46 * (g->num_cones + 1) * g->reach * operand_extent(w, i, s) * length;
 }
 
 static bool coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
