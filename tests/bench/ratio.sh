@@ -25,7 +25,7 @@ export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 for faces in diagonal centre; do
   for i in $(seq "$runs"); do
     "$work/floor" 32 64 0.5 $faces | sed -n 's/.*together //p' >>"$work/floor.$faces"
-    "$build/tests/bench_overlay" 32 64 0.5 $faces | sed 's/.*"us_overlay":\([0-9.]*\).*/\1/' >>"$work/ours.$faces"
+    "$build/tests/bench_overlay" warped 32 $faces | sed 's/.*"us_overlay":\([0-9.]*\).*/\1/' >>"$work/ours.$faces"
     mpirun -n 1 "$build/tests/bench_build" 32 64 0.5 $faces | sed 's/.*"us_build_per_source_cell":\([0-9.]*\).*/\1/' >>"$work/build.$faces"
   done
   a=$(median <"$work/floor.$faces") b=$(median <"$work/ours.$faces") c=$(median <"$work/build.$faces")

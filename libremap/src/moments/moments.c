@@ -525,11 +525,11 @@ static bool skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
   for (int l = s->first_polygon; l >= 0; l = w->polygon[l].next) {
     const polygon *g = &w->polygon[l];
     const rm_lid   t = g->triangle;
-    const double  *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    const double  *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
-    int            k = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
 
     if (g->mesh != mesh || !own->triangle_is_skin[t] || !has_area(w, i, s, g)) continue;
+    const double *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    const double *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
+    int           k    = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
     if (fabs(n[2]) > fabs(n[k])) k = 2;
     const double area = fabs(g->area) / 2 * fabs(n[k]) / square;
     double       shared = 0;

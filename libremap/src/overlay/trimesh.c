@@ -472,8 +472,47 @@ typedef struct nearness {
   rm_lid            cell;
 } nearness;
 
-/* The skin triangle belongs to a cell that shares no vertex with this one. (Cells that share one which is not pinched are
- * neighbours in the mesh.) */
+/* Height of a point over a triangle's plane, times the normal's magnitude. */
+static double height(const rm_trimesh *m, rm_lid t, const double p[3])
+{
+  const double *v = m->vertex[m->triangle[t][0]], *n = m->normal[t];
+  return n[0] * (p[0] - v[0]) + n[1] * (p[1] - v[1]) + n[2] * (p[2] - v[2]);
+}
+
+/* True if a plane clearly parts the cell from the triangle: the triangle's own, or that of a triangle of the cell. Layers of thin
+ * cells along a slanted wall are told from it this way, where their boxes cannot. */
+static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
+{
+  const double *a = m->cell_box[c], *b = m->vertex[m->triangle[skin][0]];
+  double        reach = 0;
+  int           above = 0, below = 0;
+  const rm_lid  first = m->cell_vertex_offset[c], last = m->cell_vertex_offset[c + 1];
+
+  for (int k = 0; k < 3; k++) {
+    reach = fmax(reach, fmax(fabs(a[k + 3] - b[k]), fabs(a[k] - b[k])));
+    reach = fmax(reach, fmax(fabs(m->vertex[m->triangle[skin][1]][k] - b[k]), fabs(m->vertex[m->triangle[skin][2]][k] - b[k])));
+  }
+  const double noise = 0x1p-46 * reach * reach * reach;
+  for (rm_lid k = first; k < last; k++) {
+    const double h = height(m, skin, m->vertex[m->cell_vertex[k]]);
+    above += h > noise;
+    below += h < -noise;
+  }
+  if (above == last - first || below == last - first) return true;
+  for (rm_lid k = m->cell_triangle_offset[c]; k < m->cell_triangle_offset[c + 1]; k++) {
+    const rm_lid t    = m->cell_triangle[k] / 2;
+    const double out  = m->cell_triangle[k] & 1 ? -1 : 1;
+    bool         part = true;
+
+    for (int h = 0; h < 3 && part; h++) part = out * height(m, t, m->vertex[m->triangle[skin][h]]) > noise;
+    for (rm_lid l = first; l < last && part; l++) part = out * height(m, t, m->vertex[m->cell_vertex[l]]) <= noise;
+    if (part) return true;
+  }
+  return false;
+}
+
+/* The skin triangle belongs to a cell that shares no vertex with this one, and may enter it. (Cells that share a vertex which is
+ * not pinched are neighbours in the mesh.) */
 static int is_foreign_skin(void *user, rm_lid s)
 {
   const nearness   *near  = user;
@@ -485,7 +524,7 @@ static int is_foreign_skin(void *user, rm_lid s)
   for (rm_lid k = m->cell_vertex_offset[near->cell]; k < m->cell_vertex_offset[near->cell + 1]; k++)
     for (rm_lid l = m->cell_vertex_offset[owner]; l < m->cell_vertex_offset[owner + 1]; l++)
       if (m->cell_vertex[k] == m->cell_vertex[l]) return 0;
-  return 1;
+  return !are_parted(m, near->cell, m->skin[s]);
 }
 
 /* True if every triangle of the cell is seen from inside from the mean of its vertices, clearly: the cell is then star-shaped,
