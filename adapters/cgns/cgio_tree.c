@@ -224,7 +224,6 @@ rcgns_status rc_adf_read(int64_t handle, const char *path, const char *type, con
   double       root, id;
   rcgns_status status;
 
-  if (lo >= hi) return RCGNS_OK;
   if (cgio_get_root_id((int)handle, &root) || cgio_get_node_id((int)handle, root, path, &id)) return adf_fail(message, path, "a node");
   status = read_range((int)handle, id, path, type, box, lo, hi, as, out, message);
   cgio_release_id((int)handle, id);

@@ -176,10 +176,9 @@ rcgns_status rc_h5_walk(rc_tree *tree, rcgns_message *message);
 /* Open for parallel reading. Collective; the handle is 64-bit, -1 after a failure. */
 rcgns_status rc_h5_open(MPI_Comm comm, const char *path, int64_t *handle, rcgns_message *message);
 void         rc_h5_close(int64_t handle);
-/* Read [lo, hi) of box from the node at path: as 'I' int64_t, 'R' double, 'N' its own type. Collective transfer, and no
- * agreement: ranks with nothing to read, or with failed != 0, take part with an empty selection. */
+/* Read [lo, hi), not empty, of box from the node at path: as 'I' int64_t, 'R' double, 'N' its own type. Not collective. */
 rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
-                        int failed, void *out, rcgns_message *message);
+                        void *out, rcgns_message *message);
 
 /* The same for ADF, through cgio; every call is for one rank alone. */
 bool         rc_adf_is_file(const char *path);

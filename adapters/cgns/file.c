@@ -54,10 +54,10 @@ rcgns_status rc_note(rcgns_file *file, rcgns_message *message, const char *text)
 
 /* ---- slabs -------------------------------------------------------------------------------------------------------- */
 
-/* One transfer of a rank moves at most this many values: well below the 2 GiB that MPI-IO can take at once. */
+/* One transfer moves at most this many values: well below the 2 GiB that MPI-IO can take at once. */
 enum { ROUND = 1 << 26 };
 
-/* Does the box lie in the node's array? The same on all ranks. */
+/* Does the box lie in the node's array? */
 static rcgns_status check_box(const rcgns_file *file, int64_t node, const rc_box *box, rcgns_message *message)
 {
   const rc_node *n  = node < 0 ? NULL : rc_node_at(&file->tree, node);
@@ -69,41 +69,41 @@ static rcgns_status check_box(const rcgns_file *file, int64_t node, const rc_box
             : rc_fail(message, RCGNS_IO, "%s: array %s is smaller than its zone needs", file->path, n ? n->name : "(none)");
 }
 
+/* This rank's part of a read. */
+static rcgns_status read_mine(const rcgns_file *file, int64_t node, const rc_box *box, int64_t lo, int64_t hi, char as, void *out,
+                              rcgns_message *message)
+{
+  const rc_node *n      = rc_node_at(&file->tree, node);
+  const size_t   width  = as == 'N' ? (size_t)rc_width(n->type) : sizeof(int64_t);
+  const int64_t  handle = file->handle[n->file];
+  const bool     is_adf = rc_source_at(&file->tree, n->file)->is_adf;
+  char          *path;
+  rcgns_status   status = RCGNS_OK;
+  rcgns_message  why;
+
+  if (lo >= hi) return RCGNS_OK;
+  if (lo < 0 || hi > rc_box_count(box)) return rc_fail(message, RCGNS_IO, "%s: array %s is smaller than its zone needs", file->path, n->name);
+  path = rc_tree_path(&file->tree, node);
+  if (!path) return rc_no_memory(message);
+  for (int64_t from = lo; from < hi && status == RCGNS_OK; from += ROUND) {
+    const int64_t to = hi - from < ROUND ? hi : from + ROUND;
+    char         *at = (char *)out + (size_t)(from - lo) * width;
+
+    status = is_adf ? rc_adf_read(handle, path, n->type, box, from, to, as, at, &why)
+                    : rc_h5_read(handle, path, n->type, box, from, to, as, at, &why);
+    if (status != RCGNS_OK) rc_fail(message, status, "%s: %.900s", file->path, why.text);
+  }
+  free(path);
+  return status;
+}
+
 rcgns_status rc_read(rcgns_file *file, rcgns_status mine, int64_t node, const rc_box *box, int64_t lo, int64_t hi, char as,
                      void *out, rcgns_message *message)
 {
-  rcgns_status   status = check_box(file, node, box, message);
-  const rc_node *n;
-  int64_t        rounds = 1, handle;
-  char          *path;
-  size_t         width;
+  rcgns_status status = mine;
 
-  if (status != RCGNS_OK) return rc_agree(file->comm, status, message);
-  n      = rc_node_at(&file->tree, node);
-  handle = file->handle[n->file];
-  width  = as == 'N' ? (size_t)rc_width(n->type) : 8;
-  status = mine;
-  path   = rc_tree_path(&file->tree, node);
-  if (!path && status == RCGNS_OK) status = rc_no_memory(message);
-  if (status == RCGNS_OK && (lo < 0 || (lo < hi && hi > rc_box_count(box))))
-    status = rc_fail(message, RCGNS_IO, "%s: array %s is smaller than its zone needs", file->path, n->name);
-  if (rc_box_count(box) > ROUND) {
-    rounds = hi > lo ? (hi - lo + ROUND - 1) / ROUND : 1;
-    MPI_Allreduce(MPI_IN_PLACE, &rounds, 1, MPI_INT64_T, MPI_MAX, file->comm);
-  }
-  for (int64_t r = 0; r < rounds; r++) {
-    const int64_t from = lo + r * ROUND, to = from + ROUND < hi ? from + ROUND : hi;
-    char         *at   = out ? (char *)out + (size_t)(r * ROUND) * width : NULL;
-    rcgns_message why;
-    rcgns_status  got = RCGNS_OK;
-
-    if (!rc_source_at(&file->tree, n->file)->is_adf)
-      got = rc_h5_read(handle, path ? path : "", n->type, box, from, to, as, status != RCGNS_OK, at, &why);
-    else if (status == RCGNS_OK)
-      got = rc_adf_read(handle, path, n->type, box, from, to, as, at, &why);
-    if (got != RCGNS_OK && status == RCGNS_OK) status = rc_fail(message, got, "%s: %.900s", file->path, why.text);
-  }
-  free(path);
+  if (status == RCGNS_OK) status = check_box(file, node, box, message);
+  if (status == RCGNS_OK) status = read_mine(file, node, box, lo, hi, as, out, message);
   return rc_agree(file->comm, status, message);
 }
 

@@ -6,10 +6,15 @@
  * format is kept to that of HDF5 1.8, which every CGNS library opens. */
 #include "cgns_private.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
 
 enum { COPY_ROUND = 1 << 22, WRITE_ROUND = 1 << 26 }; /* values of one rank in one transfer */
 
@@ -166,11 +171,52 @@ static void make_root(maker *m)
   H5Gclose(root);
 }
 
-static bool make_file(const char *path, const rc_plan *plan)
+/* More bytes than the file can need. */
+static int64_t most_bytes(const rc_plan *plan)
+{
+  int64_t bytes = 1 << 16;
+
+  for (int64_t i = 0; i < plan->entry.count; i++) {
+    const rc_entry *e     = rc_entry_at(plan, i);
+    int64_t         array = rc_width(e->type);
+
+    for (int d = 0; d < e->nd; d++) array *= e->dim[d];
+    bytes += 4096 + (e->nd ? array : 0);
+    if (e->content == RC_LINK) bytes += 2 * (int64_t)(strlen(e->link_file) + strlen(e->link_path));
+  }
+  return bytes;
+}
+
+/* Is there room for so many bytes, as far as one can ask? An error number, or 0. Asked before HDF5 begins, because HDF5 cannot
+ * let go of a file that it cannot write to the end. */
+static int ask_space(const char *path, int64_t bytes)
+{
+  struct statvfs disk;
+  struct rlimit  limit;
+
+  if (!getrlimit(RLIMIT_FSIZE, &limit) && limit.rlim_cur != RLIM_INFINITY && (uint64_t)limit.rlim_cur < (uint64_t)bytes) return EFBIG;
+  if (!statvfs(path, &disk) && disk.f_frsize && (uint64_t)disk.f_bavail < (uint64_t)bytes / disk.f_frsize) return ENOSPC;
+  return 0;
+}
+
+/* Claim so many bytes of disk, so that later writes cannot find it full. An error number, or 0. */
+static int claim_space(const char *path, int64_t bytes)
+{
+  const int file  = open(path, O_RDWR | O_CLOEXEC);
+  int       error = file < 0 ? errno : posix_fallocate(file, 0, (off_t)bytes);
+
+  if (file >= 0) close(file);
+  return error == EOPNOTSUPP || error == EINVAL ? 0 : error; /* a file system that cannot: writing will tell */
+}
+
+/* Everything but the values, into a new file whose space is claimed. An error number, or 0; EIO is HDF5's. */
+static int make_file(const char *path, const rc_plan *plan)
 {
   const unsigned order  = H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED;
   const hid_t    access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
   maker          m      = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true};
+  hsize_t        size   = 0;
+  int            error;
 
   H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
   H5Pset_link_creation_order(create, order);
@@ -185,23 +231,26 @@ static bool make_file(const char *path, const rc_plan *plan)
   H5Pset_fill_time(m.large, H5D_FILL_TIME_NEVER);
   m.file = H5Fcreate(path, H5F_ACC_TRUNC, create, access);
   m.ok   = m.file >= 0;
-  if (m.ok) make_root(&m);
-  for (int64_t i = 0; i < plan->entry.count && m.ok; i++) make_entry(&m, plan, i);
+  error  = m.ok ? claim_space(path, most_bytes(plan)) : EIO;
+  if (!error) make_root(&m);
+  for (int64_t i = 0; i < plan->entry.count && m.ok && !error; i++) make_entry(&m, plan, i);
+  if (m.ok && !error) m.ok = H5Fflush(m.file, H5F_SCOPE_LOCAL) >= 0 && H5Fget_filesize(m.file, &size) >= 0;
   if (m.file >= 0 && H5Fclose(m.file) < 0) m.ok = false;
+  if (m.ok && !error && truncate(path, (off_t)size)) error = errno;
   H5Pclose(m.large);
   H5Pclose(m.small);
   H5Pclose(m.group);
   H5Pclose(create);
   H5Pclose(access);
-  return m.ok;
+  return error ? error : m.ok ? 0 : EIO;
 }
 
 rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message *message)
 {
-  bool ok = false;
+  int error = ask_space(path, most_bytes(plan));
 
-  QUIETLY(ok = make_file(path, plan));
-  return ok ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: cannot be written: is the disk full or the folder read-only?", path);
+  if (!error) QUIETLY(error = make_file(path, plan));
+  return error ? rc_fail(message, RCGNS_IO, "cannot be written: %s", strerror(error)) : RCGNS_OK;
 }
 
 /* ---- values ------------------------------------------------------------------------------------------------------- */

@@ -374,18 +374,6 @@ static rcgns_status make_beside(const char *path, char *out, size_t size, rcgns_
   return RCGNS_OK;
 }
 
-/* Claim the space of the whole file now: later writes cannot find the disk full. */
-static rcgns_status claim_space(const char *part, const char *path, rcgns_message *message)
-{
-  const int   file = open(part, O_RDWR | O_CLOEXEC);
-  struct stat st;
-  int         error = file < 0 || fstat(file, &st) ? errno : st.st_size ? posix_fallocate(file, 0, st.st_size) : 0;
-
-  if (error == EOPNOTSUPP || error == EINVAL) error = 0; /* this file system cannot; writing will tell */
-  if (file >= 0) close(file);
-  return error ? rc_fail(message, RCGNS_IO, "%s: cannot be written: %s", path, strerror(error)) : RCGNS_OK;
-}
-
 /* Bring the file to the disk and give it its name. */
 static rcgns_status finish(const char *part, const char *path, rcgns_message *message)
 {
@@ -403,11 +391,7 @@ static rcgns_status begin(const rc_plan *plan, const char *path, char *part, siz
   rcgns_message why = {""};
 
   RC_TRY(make_beside(path, part, size, message));
-  if (rc_h5_skeleton(part, plan, &why) != RCGNS_OK) {
-    rc_fail(message, RCGNS_IO, "%s: cannot be written: is the disk full?", path);
-    return RCGNS_IO;
-  }
-  return claim_space(part, path, message);
+  return rc_h5_skeleton(part, plan, &why) == RCGNS_OK ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: %.900s", path, why.text);
 }
 
 static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields, rcgns_message *message)

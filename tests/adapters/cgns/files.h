@@ -130,7 +130,7 @@ static inline void cf_write(cf_file *f, const char *path)
   rcgns_message why = {""};
 
   if (rt_rank() == 0 && rc_h5_skeleton(path, &f->plan, &why) != RCGNS_OK) {
-    printf("# %s\n", why.text);
+    printf("# %s: %s\n", path, why.text);
     abort();
   }
   rc_plan_drop(&f->plan);

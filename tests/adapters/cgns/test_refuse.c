@@ -146,7 +146,7 @@ static void coordinates_that_are_no_numbers_are_refused(void)
     double   xyz[24];
     int64_t  zone;
 
-    for (int i = 0; i < 24; i++) xyz[i] = i == 16 ? NAN : i / 3 >> i % 3 & 1;
+    for (int i = 0; i < 24; i++) xyz[i] = i == 16 ? (double)NAN : (double)(i / 3 >> i % 3 & 1);
     zone = block ? cf_zone(f, cf_base(f), "Nan", 3, (int64_t[]){2, 2, 2, 1, 1, 1, 0, 0, 0}) : cf_zone(f, cf_base(f), "Nan", 1, (int64_t[]){8, 1, 0});
     if (!block) cf_section(f, zone, "Hexa", 17, 1, 1, 8, (int64_t[]){1, 2, 4, 3, 5, 6, 8, 7});
     cf_coordinates(f, zone, xyz, block ? 3 : 1, block ? (int64_t[]){2, 2, 2} : (int64_t[]){8});
