@@ -625,6 +625,7 @@ remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_p
     status       = build(arena, &b, faces, m);
   }
   rm_arena_drop(b.scratch);
+  RM_ASSERT(status != REMAP_OK || rm_trimesh_check(frame, m) != REMAP_INTERNAL);
   if (status == REMAP_OK) *out = m;
   return status;
 }
