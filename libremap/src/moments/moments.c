@@ -605,7 +605,7 @@ static remap_status finish_cell(work *w, rm_lid i)
     slot        *s  = &w->slots[k];
     const double vj = fabs(w->part->piece[1].cell_volume[s->target]), noise = volume_noise(w, i, s);
 
-    if (noise > 6 * 0x1p-29 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
+    if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
     if (fabs(s->sum[0]) <= noise || s->kinds & (SKIN_SOURCE | SKIN_TARGET)) s->first_polygon = WANTS_POLYGONS, polygons = true;
   }
   if (sums || polygons) RM_TRY(look_again(w, i, sums, polygons));
