@@ -17,6 +17,13 @@ enum {
   RM_OUTSIDE = -1 /* the state of a point in no cell; a missing side of a triangle */
 };
 
+/* How an edge may be walked through a cell (DESIGN 2.3). */
+enum {
+  RM_WALK_ALONE    = 0, /* from triangle to triangle: no other cell is near that is no neighbour                            */
+  RM_WALK_TOGETHER = 1, /* likewise, but skin that belongs to no neighbour may enter it: the edge may be in other cells too */
+  RM_WALK_NOT      = 2  /* not star-shaped, or of many triangles, or beside such a cell: crossings come from the box tree   */
+};
+
 /* Read-only once built. Invariants:
  *   vertices are distinct and ascend in (Morton key, x, y, z); triangles have ascending corners and ascend lexicographically
  *   except that copies of one triangle that do not join stand side by side; edges ascend lexicographically;
@@ -44,7 +51,7 @@ typedef struct rm_trimesh {
   const uint8_t (*cell_edge_end)[2];    /* [same] their ends, as places in the cell's vertices                   */
   const uint8_t (*cell_triangle_edge)[3]; /* [cell_triangle_offset[num_cells]] as places in the cell's edges     */
   const double (*cell_box)[6];          /* [num_cells] min x, y, z, max x, y, z                                  */
-  const uint8_t *cell_by_tree;          /* [num_cells] 1: walking by adjacency is not allowed here (DESIGN 2.3)  */
+  const uint8_t *cell_walk;             /* [num_cells] RM_WALK_                                                   */
   double         box[6];                /* of all vertices; min > max if there are none                          */
   const rm_lid  *skin;                  /* [num_skin] triangles with one side only, ascending                    */
   const double (*skin_box)[6];          /* [num_skin]                                                            */

@@ -20,6 +20,11 @@ typedef struct hit {
 
 enum { MAX_LOCAL = 256 };
 
+/* Error of an edge's side against a line in the sheared frame, by the square of the reach of its coordinates. With u = 2^-53:
+ * differences err by u, shears by 3 u, so sheared coordinates, at most 2 reach, by 8 u reach; their products and the difference of
+ * these by less than 80 u reach^2. */
+#define LINE_NOISE 0x1p-46
+
 typedef struct tracer {
   const rm_trimesh *own, *other;
   int               moved;
@@ -38,17 +43,16 @@ typedef struct tracer {
   int64_t           num_crossings, crossing_room;
   int64_t          *first;
   rm_lid           *count, *state;
-  /* the present edge */
+  /* the present edge, or ray */
   const double     *p0, *p1;
   double            beyond[3]; /* far end of a ray */
   double            u[3], shear[2]; /* p1 - p0; u[axis[0]] / u[axis[2]], u[axis[1]] / u[axis[2]] */
   int               axis[3];        /* axis[2] is the edge's longest direction; a cyclic permutation of x, y, z */
 } tracer;
 
-static void set_edge(tracer *t, rm_lid e)
+static void set_line(tracer *t, const double *p0, const double *p1)
 {
-  const double *p0 = t->own->vertex[t->own->edge[e][0]], *p1 = t->own->vertex[t->own->edge[e][1]];
-  int           k = 0;
+  int k = 0;
 
   t->p0 = p0, t->p1 = p1;
   for (int c = 0; c < 3; c++) t->u[c] = p1[c] - p0[c];
@@ -73,6 +77,30 @@ static int edge_side(const tracer *t, rm_lid f)
 {
   const rm_trimesh *m = t->other;
   return rm_edge_side(t->p0, t->p1, m->vertex[m->edge[f][0]], m->vertex[m->edge[f][1]], t->moved, NULL);
+}
+
+/* What the filter of line_sides tells about one triangle: true if the present edge's line passes it by. */
+static bool surely_misses(const tracer *t, rm_lid b)
+{
+  const int    i = t->axis[0], j = t->axis[1], k = t->axis[2];
+  double       x[3], y[3], reach = 0;
+  int          along = 0, against = 0;
+
+  for (int h = 0; h < 3; h++) {
+    const double *q = t->other->vertex[t->other->triangle[b][h]];
+    const double  dx = q[i] - t->p0[i], dy = q[j] - t->p0[j], dz = q[k] - t->p0[k];
+    x[h]  = dx - t->shear[0] * dz;
+    y[h]  = dy - t->shear[1] * dz;
+    reach = fmax(reach, fmax(fabs(dx), fmax(fabs(dy), fabs(dz))));
+  }
+  const double bound = LINE_NOISE * reach * reach;
+  for (int h = 0; h < 3; h++) {
+    const int    g = (h + 1) % 3;
+    const double d = x[h] * y[g] - x[g] * y[h];
+    along += d > bound;
+    against += d < -bound;
+  }
+  return along && against;
 }
 
 /* Side of an end of the present edge against triangle b's plane. */
@@ -130,14 +158,6 @@ static remap_status push_hit(tracer *t, rm_lid triangle, int sign)
   return REMAP_OK;
 }
 
-static void edge_box(const tracer *t, double box[6])
-{
-  for (int c = 0; c < 3; c++) {
-    box[c]     = t->p0[c] < t->p1[c] ? t->p0[c] : t->p1[c];
-    box[c + 3] = t->p0[c] < t->p1[c] ? t->p1[c] : t->p0[c];
-  }
-}
-
 /* ---- crossings from a box tree ----------------------------------------------------------------------------------- */
 
 typedef struct collect {
@@ -153,7 +173,7 @@ static int collect_hit(void *user, rm_lid item)
 {
   collect     *c = user;
   const rm_lid b = c->triangle_of ? c->triangle_of[item] : item;
-  const int    s = meets(c->t, b);
+  const int    s = surely_misses(c->t, b) ? 0 : meets(c->t, b);
 
   if (!s) return 0;
   c->status = rm_grow(c->list, c->room, *c->num + 1, sizeof **c->list);
@@ -182,12 +202,10 @@ static remap_status need_all_tree(tracer *t)
 static remap_status all_hits(tracer *t)
 {
   collect c = {t, NULL, &t->hits, &t->hits_room, &t->num_hits, REMAP_OK};
-  double  box[6];
 
   RM_TRY(need_all_tree(t));
   t->num_hits = 0;
-  edge_box(t, box);
-  rm_boxtree_query(t->all_tree, (const double (*)[6])t->all_box, box, collect_hit, &c);
+  rm_boxtree_query_segment(t->all_tree, (const double (*)[6])t->all_box, t->p0, t->p1, collect_hit, &c);
   RM_TRY(c.status);
   sort_hits(t, t->hits, t->num_hits);
   return REMAP_OK;
@@ -196,12 +214,10 @@ static remap_status all_hits(tracer *t)
 static remap_status need_skin_hits(tracer *t)
 {
   collect c = {t, t->other->skin, &t->skin_hits, &t->skin_room, &t->num_skin, REMAP_OK};
-  double  box[6];
 
   if (t->num_skin >= 0) return REMAP_OK;
   t->num_skin = 0;
-  edge_box(t, box);
-  rm_boxtree_query(t->other->skin_tree, t->other->skin_box, box, collect_hit, &c);
+  rm_boxtree_query_segment(t->other->skin_tree, t->other->skin_box, t->p0, t->p1, collect_hit, &c);
   RM_TRY(c.status);
   sort_hits(t, t->skin_hits, t->num_skin);
   return REMAP_OK;
@@ -237,9 +253,7 @@ static void line_sides(const tracer *t, rm_lid c, int8_t *side)
     x[v] = ((q[i] - pi) - si * z) * flip;
     y[v] = (q[j] - pj) - sj * z;
   }
-  /* With u = 2^-53: differences err by u, shears by 3 u, so x and y by 8 u reach; the products and their difference by less than
-   * 80 u reach^2, of magnitudes at most 2 reach. */
-  const double bound = 0x1p-46 * reach * reach;
+  const double bound = LINE_NOISE * reach * reach;
   for (rm_lid f = 0; f < ne; f++) {
     const double d = x[end[f][0]] * y[end[f][1]] - x[end[f][1]] * y[end[f][0]];
     const int    s = (d > bound) - (d < -bound);
@@ -318,35 +332,101 @@ static ahead enter_mesh(const tracer *t, hit last, int dir, hit *next)
   return AHEAD_END;
 }
 
-/* Walk the present edge from one end, in state *state there, to the other. hits receive the crossings in walking order, *state the
- * state at the far end. *walked is false if adjacency could not do it; *state is then unchanged. */
-static remap_status walk(tracer *t, int dir, rm_lid *state, bool *walked)
+/* What a way of finding the crossings came to. */
+typedef enum walked { WALKED, WALK_TOGETHER, WALK_NOT } walked;
+
+/* Follow the present edge from cell *at, entered through `last` or started in, until it ends or comes out of the mesh; *at becomes
+ * where it is then. Cells may ask for no more than `most`, an RM_WALK_. */
+static remap_status follow(tracer *t, rm_lid *at, hit *last, int dir, int most, walked *how)
+{
+  hit next = {-1, 0};
+
+  while (*at >= 0) {
+    if (t->other->cell_walk[*at] > most) {
+      *how = t->other->cell_walk[*at] == RM_WALK_NOT ? WALK_NOT : WALK_TOGETHER;
+      return REMAP_OK;
+    }
+    const ahead what = leave_cell(t, *at, *last, dir, &next);
+    if (what == AHEAD_TANGLED || t->num_hits > 2 * t->other->num_triangles) {
+      *how = WALK_NOT;
+      return REMAP_OK;
+    }
+    if (what == AHEAD_END) break;
+    RM_TRY(push_hit(t, next.triangle, next.sign));
+    *at   = t->other->side[next.triangle][next.sign * dir > 0 ? 1 : 0];
+    *last = next;
+  }
+  *how = WALKED;
+  return REMAP_OK;
+}
+
+/* Walk the present edge from one end, in state *state there, to the other, in one cell or outside all the way. hits receive the
+ * crossings in walking order, *state the state at the far end; it is unchanged unless *how is WALKED. */
+static remap_status walk_alone(tracer *t, int dir, rm_lid *state, walked *how)
 {
   rm_lid at   = *state;
-  hit    last = {-1, 0}, next = {-1, 0};
+  hit    last = {-1, 0}, next;
+  ahead  what;
 
   t->num_hits = 0;
-  *walked     = false;
-  if (t->by_tree) return REMAP_OK;
+  *how        = WALK_TOGETHER;
+  if (at < RM_OUTSIDE) return REMAP_OK;
   for (;;) {
-    ahead what;
-
-    if (at < RM_OUTSIDE || (at >= 0 && t->other->cell_by_tree[at])) return REMAP_OK;
-    if (at == RM_OUTSIDE) {
-      RM_TRY(need_skin_hits(t));
-      what = enter_mesh(t, last, dir, &next);
-    } else {
-      what = leave_cell(t, at, last, dir, &next);
-    }
+    RM_TRY(follow(t, &at, &last, dir, RM_WALK_ALONE, how));
+    if (*how != WALKED) return REMAP_OK;
+    if (at >= 0) break;
+    RM_TRY(need_skin_hits(t));
+    what = enter_mesh(t, last, dir, &next);
+    if (what == AHEAD_TANGLED) *how = WALK_NOT;
     if (what == AHEAD_TANGLED) return REMAP_OK;
     if (what == AHEAD_END) break;
     RM_TRY(push_hit(t, next.triangle, next.sign));
-    if (t->num_hits > 2 * t->other->num_triangles) return REMAP_INCONSISTENT;
     at   = t->other->side[next.triangle][next.sign * dir > 0 ? 1 : 0];
     last = next;
   }
-  *walked = true;
-  *state  = at;
+  *state = at;
+  return REMAP_OK;
+}
+
+/* Where skins overlap or nearly so, the edge may be in several cells at once. Each of them is followed by itself, from the start or
+ * from the skin where it comes in, to the end or to the skin where it goes out: star-shaped cells joined by their faces know of no
+ * others. hits receive all crossings, ascending along the edge. */
+static remap_status walk_together(tracer *t, int dir, rm_lid state, walked *how)
+{
+  const rm_lid     *side;
+  const rm_winding  single = {state, 1}, *list = &single;
+  rm_lid            num = state >= 0, out = 0, going_out = 0;
+
+  if (state < RM_OUTSIDE) {
+    list = t->states.winding + t->states.offset[-2 - state];
+    num  = t->states.offset[-1 - state] - t->states.offset[-2 - state];
+  }
+  t->num_hits = 0;
+  *how        = WALK_NOT;
+  RM_TRY(need_skin_hits(t));
+  for (rm_lid k = 0; k < num + t->num_skin; k++) {
+    hit    last = {-1, 0};
+    rm_lid at;
+
+    if (k < num) {
+      if (list[k].number != 1) return REMAP_OK;
+      at = list[k].cell;
+    } else {
+      last = t->skin_hits[k - num];
+      side = t->other->side[last.triangle];
+      at   = side[last.sign * dir > 0 ? 1 : 0];
+      if (at < 0) {
+        going_out++;
+        continue;
+      }
+      RM_TRY(push_hit(t, last.triangle, last.sign));
+    }
+    RM_TRY(follow(t, &at, &last, dir, RM_WALK_TOGETHER, how));
+    if (*how != WALKED) return REMAP_OK;
+    out += at < 0;
+  }
+  *how = out == going_out ? WALKED : WALK_NOT;
+  sort_hits(t, t->hits, t->num_hits);
   return REMAP_OK;
 }
 
@@ -362,24 +442,30 @@ static double parameter(const tracer *t, rm_lid b)
   return l > 0 ? l < 1 ? l : 1 : 0; /* NaN becomes 0 */
 }
 
+static void reverse(hit *h, int n)
+{
+  for (int i = 0, k = n - 1; i < k; i++, k--) {
+    const hit x = h[i];
+    h[i]        = h[k];
+    h[k]        = x;
+  }
+}
+
 /* Trace edge e from the end that has state *state; *state becomes the other end's. */
 static remap_status trace_edge(tracer *t, rm_lid e, int dir, rm_lid *state)
 {
-  rm_lid at = *state;
-  bool   walked;
+  rm_lid at  = *state;
+  walked how = WALK_NOT;
 
-  set_edge(t, e);
-  RM_TRY(walk(t, dir, state, &walked));
-  if (!walked) {
-    RM_TRY(all_hits(t));
+  set_line(t, t->own->vertex[t->own->edge[e][0]], t->own->vertex[t->own->edge[e][1]]);
+  if (!t->by_tree) RM_TRY(walk_alone(t, dir, state, &how));
+  if (how == WALKED) {
+    if (dir < 0) reverse(t->hits, t->num_hits);
+  } else {
+    if (how == WALK_TOGETHER) RM_TRY(walk_together(t, dir, *state, &how));
+    if (how != WALKED) RM_TRY(all_hits(t));
     for (int k = 0; k < t->num_hits; k++)
       RM_TRY(rm_states_cross(&t->states, *state, t->other->side[t->hits[k].triangle], t->hits[k].sign * dir, state));
-  } else if (dir < 0) {
-    for (int i = 0, k = t->num_hits - 1; i < k; i++, k--) {
-      const hit h = t->hits[i];
-      t->hits[i]  = t->hits[k];
-      t->hits[k]  = h;
-    }
   }
   at = dir > 0 ? at : *state;
   RM_TRY(rm_grow(&t->crossing, &t->crossing_room, t->num_crossings + t->num_hits, sizeof *t->crossing));
@@ -405,7 +491,7 @@ static remap_status locate(tracer *t, const double *p, rm_lid *state)
   if (p[0] > m->box[3] || p[1] < m->box[1] || p[1] > m->box[4] || p[2] < m->box[2] || p[2] > m->box[5]) return REMAP_OK;
   t->beyond[0] = 2; /* every coordinate is below 1 in magnitude */
   t->beyond[1] = p[1], t->beyond[2] = p[2];
-  t->p0 = p, t->p1 = t->beyond;
+  set_line(t, p, t->beyond);
   if (t->all_tree) {
     RM_TRY(all_hits(t));
     for (int k = 0; k < t->num_hits; k++)

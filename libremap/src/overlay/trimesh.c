@@ -465,7 +465,7 @@ static remap_status pinched_vertices(rm_arena *scratch, const rm_trimesh *m, uin
   return REMAP_OK;
 }
 
-/* ---- where walking by adjacency is allowed ----------------------------------------------------------------------- */
+/* ---- how edges may walk                    ----------------------------------------------------------------------- */
 
 typedef struct nearness {
   const rm_trimesh *m;
@@ -550,40 +550,36 @@ static bool is_star_shaped(const rm_trimesh *m, rm_lid c)
   return first < last;
 }
 
-static int any(void *user, rm_lid item)
+static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
 {
-  (void)user, (void)item;
-  return 1;
-}
-
-static remap_status forbid_adjacency(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
-{
-  uint8_t *by_tree, *pinched;
+  uint8_t *walk, *pinched;
   double (*odd_box)[6];
   rm_lid   num_odd = 0;
   const rm_boxtree *odd_tree;
 
-  RM_NEW0(by_tree, arena, m->num_cells);
+  RM_NEW0(walk, arena, m->num_cells);
   RM_NEW0(pinched, scratch, m->num_vertices);
   RM_NEW(odd_box, scratch, m->num_cells);
   RM_TRY(pinched_vertices(scratch, m, pinched));
   for (rm_lid c = 0; c < m->num_cells; c++) {
-    nearness near = {m, c};
+    const bool is_large = m->cell_edge_offset[c] == m->cell_edge_offset[c + 1];
+    nearness   near = {m, c};
 
-    if (m->cell_edge_offset[c] == m->cell_edge_offset[c + 1]) by_tree[c] = 1;
-    for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++) by_tree[c] |= pinched[m->cell_vertex[k]];
-    if (!by_tree[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) by_tree[c] = 1;
-    if (m->cell_edge_offset[c] == m->cell_edge_offset[c + 1] ? m->num_cells > 1 : !is_star_shaped(m, c)) {
-      by_tree[c] = 1;
+    for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++)
+      if (pinched[m->cell_vertex[k]]) walk[c] = RM_WALK_TOGETHER;
+    if (!walk[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) walk[c] = RM_WALK_TOGETHER;
+    if (is_large) walk[c] = RM_WALK_NOT;
+    if (is_large ? m->num_cells > 1 : !is_star_shaped(m, c)) {
+      walk[c] = RM_WALK_NOT;
       memcpy(odd_box[num_odd++], m->cell_box[c], sizeof *odd_box);
     }
   }
   if (num_odd) {
     RM_TRY(rm_boxtree_build(scratch, num_odd, (const double (*)[6])odd_box, &odd_tree));
     for (rm_lid c = 0; c < m->num_cells; c++)
-      if (!by_tree[c] && rm_boxtree_query(odd_tree, (const double (*)[6])odd_box, m->cell_box[c], any, NULL)) by_tree[c] = 1;
+      if (walk[c] != RM_WALK_NOT && rm_boxtree_meets(odd_tree, (const double (*)[6])odd_box, m->cell_box[c])) walk[c] = RM_WALK_NOT;
   }
-  m->cell_by_tree = by_tree;
+  m->cell_walk = walk;
   return REMAP_OK;
 }
 
@@ -610,7 +606,7 @@ static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_tri
   RM_TRY(edges_of_cells(arena, b->scratch, m));
   RM_TRY(boxes(arena, m));
   RM_TRY(collect_skin(arena, m));
-  return forbid_adjacency(arena, b->scratch, m);
+  return choose_walks(arena, b->scratch, m);
 }
 
 remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,

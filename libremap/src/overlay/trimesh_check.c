@@ -183,8 +183,8 @@ static bool local_numbers_are_right(const rm_trimesh *m, rm_lid c)
   const rm_lid first_vertex = m->cell_vertex_offset[c], num_vertices = m->cell_vertex_offset[c + 1] - first_vertex;
   const rm_lid begin = m->cell_triangle_offset[c], end = m->cell_triangle_offset[c + 1];
 
-  if (num_edges < 0 || num_vertices < 0 || m->cell_by_tree[c] > 1) return false;
-  if (num_edges == 0) return num_vertices == 0 && m->cell_by_tree[c] == 1;
+  if (num_edges < 0 || num_vertices < 0 || m->cell_walk[c] > RM_WALK_NOT) return false;
+  if (num_edges == 0) return num_vertices == 0 && m->cell_walk[c] == RM_WALK_NOT;
   for (rm_lid v = 0; v < num_vertices; v++) {
     bool used = false;
     for (rm_lid f = 0; f < num_edges && !used; f++)

@@ -3,6 +3,8 @@
  * and 32 bytes per item besides the result; with leaves of n / 64 items the same split makes the coarse groups in O(n). */
 #include "zone/zone.h"
 
+#include <math.h>
+
 enum { LEAF_ITEMS = 8, MAX_DEPTH = 64 };
 
 /* An item on its way into the tree, with what the splits compare: twice the centre of its box. */
@@ -185,8 +187,36 @@ remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], 
   return REMAP_OK;
 }
 
-int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
-                     int (*visit)(void *user, rm_lid item), void *user)
+/* What a query looks for: a box or a straight segment. */
+typedef struct shape {
+  double box[6];                   /* of the segment too              */
+  double middle[3], half[3], slack; /* of the segment                  */
+} shape;
+
+/* True unless one of the axes that are normal to the segment and to an edge of the box parts them; slack covers rounding. */
+static inline bool segment_meets(const shape *s, const double box[6])
+{
+  double t[3], e[3];
+
+  if (!rm_box_meets(s->box, box)) return false;
+  for (int d = 0; d < 3; d++) {
+    e[d] = 0.5 * (box[d + 3] - box[d]);
+    t[d] = box[d] + e[d] - s->middle[d];
+  }
+  for (int d = 0; d < 3; d++) {
+    const int    i = (d + 1) % 3, j = (d + 2) % 3;
+    const double hi = fabs(s->half[i]), hj = fabs(s->half[j]);
+
+    if (fabs(t[i] * s->half[j] - t[j] * s->half[i]) > e[i] * hj + e[j] * hi + s->slack * (fabs(t[i]) + fabs(t[j]) + e[i] + e[j] + hi + hj))
+      return false;
+  }
+  return true;
+}
+
+static inline bool box_meets(const shape *s, const double box[6]) { return rm_box_meets(s->box, box); }
+
+static inline int query(const rm_boxtree *tree, const double (*item_box)[6], const shape *s,
+                        bool (*meets)(const shape *s, const double box[6]), int (*visit)(void *user, rm_lid item), void *user)
 {
   rm_lid stack[MAX_DEPTH];
   int    depth = 0;
@@ -195,7 +225,7 @@ int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const 
   while (depth > 0) {
     const rm_lid node = stack[--depth], first = tree->first[node], end = first + tree->count[node];
 
-    if (!rm_box_meets(tree->box[node], box)) continue;
+    if (!meets(s, tree->box[node])) continue;
     if (tree->count[node] == 0) {
       RM_ASSERT(depth + 2 <= MAX_DEPTH);
       stack[depth++] = first;
@@ -204,12 +234,38 @@ int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const 
     }
     for (rm_lid i = first; i < end; i++) {
       const rm_lid item   = tree->item[i];
-      const int    result = rm_box_meets(item_box[item], box) ? visit(user, item) : 0;
+      const int    result = meets(s, item_box[item]) ? visit(user, item) : 0;
 
       if (result != 0) return result;
     }
   }
   return 0;
+}
+
+int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
+                     int (*visit)(void *user, rm_lid item), void *user)
+{
+  shape s;
+
+  box_copy(s.box, box);
+  return query(tree, item_box, &s, box_meets, visit, user);
+}
+
+int rm_boxtree_query_segment(const rm_boxtree *tree, const double (*item_box)[6], const double p[3], const double q[3],
+                             int (*visit)(void *user, rm_lid item), void *user)
+{
+  shape s = {.slack = 0};
+
+  for (int d = 0; d < 3; d++) {
+    s.box[d]     = p[d] < q[d] ? p[d] : q[d];
+    s.box[d + 3] = p[d] < q[d] ? q[d] : p[d];
+    s.half[d]    = 0.5 * (s.box[d + 3] - s.box[d]);
+    s.middle[d]  = s.box[d] + s.half[d];
+    s.slack      = fmax(s.slack, fmax(s.half[d], 4 * fmax(fabs(p[d]), fabs(q[d]))));
+    if (p[d] > q[d]) s.half[d] = -s.half[d];
+  }
+  s.slack *= 0x1p-48; /* coordinates of magnitude c make t and e err by a few ulps of c */
+  return query(tree, item_box, &s, segment_meets, visit, user);
 }
 
 static int stop(void *user, rm_lid item)

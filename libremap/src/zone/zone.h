@@ -30,6 +30,10 @@ remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6],
 int rm_boxtree_query(const rm_boxtree *tree, const double (*item_box)[6], const double box[6],
                      int (*visit)(void *user, rm_lid item), void *user);
 
+/* The same for every item whose own box meets the straight segment pq, and perhaps for some that miss it by rounding. */
+int rm_boxtree_query_segment(const rm_boxtree *tree, const double (*item_box)[6], const double p[3], const double q[3],
+                             int (*visit)(void *user, rm_lid item), void *user);
+
 /* True if some item's own box meets `box`. O(log n) mostly. */
 bool rm_boxtree_meets(const rm_boxtree *tree, const double (*item_box)[6], const double box[6]);
 
