@@ -28,12 +28,12 @@ bool rc_adf_is_file(const char *path)
 
 static char kind_of(const char *type)
 {
-  switch (type[0]) {
-  case 'C': case 'B': return 'C';
-  case 'I': case 'U': return 'I';
-  case 'R': case 'X': return type[0];
-  default: return strcmp(type, "MT") && strcmp(type, "LK") ? '?' : 0;
-  }
+  static const char *const known[] = {"I4", "I8", "U4", "U8", "R4", "R8", "C1", "B1"};
+
+  if (!strcmp(type, "MT") || !strcmp(type, "LK")) return 0;
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    if (!strcmp(type, known[i])) return type[0] == 'U' ? 'I' : type[0] == 'B' ? 'C' : type[0];
+  return '?';
 }
 
 /* Read one box. Memory is filled in the order of the box. */
@@ -60,19 +60,26 @@ static int read_box(int cg, double id, const char *type, const rc_box *box, void
 /* Widen raw values of a type to int64_t ('I') or double ('R'); false: it is not numeric. */
 static bool widen(const char *type, const void *raw, int64_t count, char as, void *out)
 {
-#define EACH(from)                                                                   \
-  do {                                                                               \
-    const from *in = raw;                                                            \
+#define EACH(from)                                                                         \
+  do {                                                                                     \
+    const from *in = raw;                                                                  \
     for (int64_t i = 0; i < count && as == 'I'; i++) ((int64_t *)out)[i] = (int64_t)in[i]; \
     for (int64_t i = 0; i < count && as == 'R'; i++) ((double *)out)[i] = (double)in[i];   \
   } while (0)
-  if (!strcmp(type, "I4")) EACH(int32_t);
-  else if (!strcmp(type, "U4")) EACH(uint32_t);
-  else if (!strcmp(type, "I8")) EACH(int64_t);
-  else if (!strcmp(type, "U8")) EACH(uint64_t);
-  else if (!strcmp(type, "R8") && as == 'R') EACH(double);
-  else if (!strcmp(type, "R4") && as == 'R') EACH(float);
-  else return false;
+  if (!strcmp(type, "I4"))
+    EACH(int32_t);
+  else if (!strcmp(type, "U4"))
+    EACH(uint32_t);
+  else if (!strcmp(type, "I8"))
+    EACH(int64_t);
+  else if (!strcmp(type, "U8"))
+    EACH(uint64_t);
+  else if (!strcmp(type, "R8") && as == 'R')
+    EACH(double);
+  else if (!strcmp(type, "R4") && as == 'R')
+    EACH(float);
+  else
+    return false;
 #undef EACH
   return true;
 }
@@ -97,27 +104,30 @@ static rcgns_status read_range(int cg, double id, const char *path, const char *
 /* Type, size and, if it is small, the payload of a node. */
 static rcgns_status payload(rc_tree *tree, int cg, double id, const char *path, rc_node *n, rcgns_message *message)
 {
-  cgsize_t     dims[CGIO_MAX_DIMENSIONS] = {0};
-  int          nd = 0;
-  const rc_source *source = rc_source_at(tree, 0);
-  int64_t      count;
-  rcgns_status status;
-  void        *small;
-  rc_box       box;
+  cgsize_t         dims[CGIO_MAX_DIMENSIONS]       = {0};
+  char             type[CGIO_MAX_LABEL_LENGTH + 1] = ""; /* ADF knows types of many letters */
+  int              nd                              = 0;
+  const rc_source *source                          = rc_source_at(tree, 0);
+  int64_t          count;
+  rcgns_status     status;
+  void            *small;
+  rc_box           box;
 
-  if (cgio_get_data_type(cg, id, n->type) || cgio_get_dimensions(cg, id, &nd, dims)) return adf_fail(message, path, n->name);
-  n->kind = kind_of(n->type);
+  if (cgio_get_data_type(cg, id, type) || cgio_get_dimensions(cg, id, &nd, dims)) return adf_fail(message, path, n->name);
+  memcpy(n->type, type, 2);
+  n->kind = kind_of(type);
   n->nd   = n->kind ? nd : 0;
   for (int d = 0; d < n->nd; d++) {
     n->dim[d] = (int64_t)dims[nd - 1 - d];
-    if (n->dim[d] < 0) return rc_fail(message, RCGNS_IO, "%s: node %s has a size beyond 2^31: convert the file to HDF5 (adf2hdf)",
-                                      path, n->name);
+    if (n->dim[d] < 0)
+      return rc_fail(message, RCGNS_IO, "%s: node %s has a size beyond 2^31: convert the file to HDF5 (adf2hdf)", path,
+                     n->name);
   }
   count = rc_count(n);
   if (count < 1 || !n->nd) n->kind = 0, n->nd = 0;
   if (n->kind && !n->is_link && count > source->size / (rc_width(n->type) ? rc_width(n->type) : 1))
-    return rc_fail(message, RCGNS_IO, "%s: node %s claims more data than the file holds: the file is truncated or damaged", path,
-                   n->name);
+    return rc_fail(message, RCGNS_IO, "%s: node %s claims more data than the file holds: the file is truncated or damaged",
+                   path, n->name);
   if (!rc_is_small(n)) return RCGNS_OK;
   box   = rc_whole(n);
   small = rc_alloc(count, sizeof(int64_t));
@@ -153,7 +163,7 @@ static rcgns_status link_of(rc_tree *tree, int cg, double id, const char *path, 
 
 static rcgns_status walk(rc_tree *tree, int cg, double id, int64_t parent, int depth, const char *path, rcgns_message *message)
 {
-  rc_node      n = {.link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
+  rc_node      n        = {.link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
   int          children = 0, got = 0;
   double      *ids = NULL;
   int64_t      me;
@@ -213,10 +223,7 @@ rcgns_status rc_adf_open(const char *path, int64_t *handle, rcgns_message *messa
   return RCGNS_OK;
 }
 
-void rc_adf_close(int64_t handle)
-{
-  cgio_close_file((int)handle);
-}
+void rc_adf_close(int64_t handle) { cgio_close_file((int)handle); }
 
 rcgns_status rc_adf_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
                          void *out, rcgns_message *message)
@@ -224,7 +231,8 @@ rcgns_status rc_adf_read(int64_t handle, const char *path, const char *type, con
   double       root, id;
   rcgns_status status;
 
-  if (cgio_get_root_id((int)handle, &root) || cgio_get_node_id((int)handle, root, path, &id)) return adf_fail(message, path, "a node");
+  if (cgio_get_root_id((int)handle, &root) || cgio_get_node_id((int)handle, root, path, &id))
+    return adf_fail(message, path, "a node");
   status = read_range((int)handle, id, path, type, box, lo, hi, as, out, message);
   cgio_release_id((int)handle, id);
   return status;

@@ -15,8 +15,9 @@
  *   - `message`, never NULL, holds one line without a newline after a failure (it names the file, zone and cell or field, and
  *     what to do) and is empty after success;
  *   - outputs are written only when RCGNS_OK is returned;
- *   - cells are numbered zone after zone, in the order of the file, from 0; rank r of P owns the contiguous range of them
- *     from N r / P to N (r + 1) / P. Only volume cells count: surface sections and two-dimensional zones are left out;
+ *   - cells are numbered zone after zone, in the order of the file, from 0; each rank owns one contiguous range of them, in
+ *     the order of the ranks, the ranges being of equal length to within one. Only volume cells count: surface sections and
+ *     two-dimensional zones are left out;
  *   - zones are called "Base/Zone";
  *   - ADF and HDF5 files of any version are read; output is HDF5;
  *   - no function prints or exits; input files are never opened for writing.
@@ -38,11 +39,11 @@ extern "C" {
 #endif
 
 /** Every status: name, number, text. The greater one wins when ranks differ. */
-#define RCGNS_STATUS_LIST(X)                                           \
-  X(OK, 0, "success")                                                  \
-  X(USAGE, 1, "what was asked for does not fit this file")             \
-  X(IO, 2, "a file cannot be read or written, or is not valid CGNS")   \
-  X(GEOMETRY, 3, "the file's mesh is broken")                          \
+#define RCGNS_STATUS_LIST(X)                                         \
+  X(OK, 0, "success")                                                \
+  X(USAGE, 1, "what was asked for does not fit this file")           \
+  X(IO, 2, "a file cannot be read or written, or is not valid CGNS") \
+  X(GEOMETRY, 3, "the file's mesh is broken")                        \
   X(MEMORY, 4, "memory could not be allocated, or MPI failed")
 
 typedef enum rcgns_status {
@@ -151,7 +152,8 @@ remap_nature rcgns_nature(const char *name, int is_integer, int *known);
  *  Errors: USAGE (no such base), IO (missing, truncated, not CGNS, no volume cells, no coordinates, a size that does not
  *  match), GEOMETRY (NaN or infinite coordinates, a node number out of range, a face with more than two cells, a polyhedron
  *  with too few faces), MEMORY. That every cell is closed is remap_build's to check. */
-rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *options, rcgns_file **out, rcgns_message *message);
+rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *options, rcgns_file **out,
+                        rcgns_message *message);
 
 /** What the file holds. Not collective. */
 const rcgns_info *rcgns_get_info(const rcgns_file *file);
@@ -192,8 +194,8 @@ void rcgns_close(rcgns_file **file);
 /** Write a small HDF5 file with one base "Base" and the given zones, stamped `version` (4.2 suits most readers, 3.4 suits
  *  Debian's tools). solution: name of the CellCenter FlowSolution_t, NULL if no zone has fields. An existing file is
  *  replaced. Not collective: one rank calls it. Errors: USAGE, IO, MEMORY. */
-rcgns_status rcgns_create(const char *path, double version, const char *solution, int64_t num_zones, const rcgns_new_zone *zones,
-                          rcgns_message *message);
+rcgns_status rcgns_create(const char *path, double version, const char *solution, int64_t num_zones,
+                          const rcgns_new_zone *zones, rcgns_message *message);
 
 #ifdef __cplusplus
 }

@@ -22,28 +22,28 @@
 
 enum {
   RC_MAX_DIMS  = 12,
-  RC_NAME      = 33,       /* 32 characters and NUL */
+  RC_NAME      = 33, /* 32 characters and NUL */
   RC_MAX_BOXES = 2 * RC_MAX_DIMS
 };
 
 /* ---- status ------------------------------------------------------------------------------------------------------- */
 
 /* Hand a failure up; only where nothing is owned. */
-#define RC_TRY(call)                              \
-  do {                                            \
-    const rcgns_status rc_try_ = (call);          \
-    if (rc_try_ != RCGNS_OK) return rc_try_;      \
+#define RC_TRY(call)                         \
+  do {                                       \
+    const rcgns_status rc_try_ = (call);     \
+    if (rc_try_ != RCGNS_OK) return rc_try_; \
   } while (0)
 
 /* Hand it up through the one cleanup label; assign is an assignment to the status. */
-#define RC_GOTO(label, assign)                    \
-  do {                                            \
-    if ((assign) != RCGNS_OK) goto label;         \
+#define RC_GOTO(label, assign)            \
+  do {                                    \
+    if ((assign) != RCGNS_OK) goto label; \
   } while (0)
 
 /* Format the message and return the status, so that `return rc_fail(...)` reads as one act. */
 rcgns_status rc_fail(rcgns_message *message, rcgns_status status, const char *format, ...)
-  __attribute__((format(printf, 3, 4)));
+    __attribute__((format(printf, 3, 4)));
 
 /* MEMORY, with the words for it. */
 rcgns_status rc_no_memory(rcgns_message *message);
@@ -72,10 +72,10 @@ void *rc_alloc(int64_t count, size_t size);
 
 /* A map from keys of 1 to 4 int64_t to 0, 1, 2 ... in the order they come. All zero is an empty map of no width. */
 typedef struct rc_map {
-  int       width; /* int64_t per key */
-  rc_array  key;   /* [count][width] */
-  int64_t  *slot;  /* [num_slots] index of a key, -1: free */
-  int64_t   num_slots;
+  int      width; /* int64_t per key */
+  rc_array key;   /* [count][width] */
+  int64_t *slot;  /* [num_slots] index of a key, -1: free */
+  int64_t  num_slots;
 } rc_map;
 
 /* Index of the key, which is added if new; -1: no memory. */
@@ -85,7 +85,7 @@ void    rc_map_drop(rc_map *map);
 /* ---- distribution ------------------------------------------------------------------------------------------------- */
 
 /* First of n items that rank r of size ranks owns; r == size gives n. Shares differ by one at most. */
-int64_t rc_share(int64_t n, int rank, int size);
+int64_t               rc_share(int64_t n, int rank, int size);
 static inline int64_t rc_clamp(int64_t value, int64_t lo, int64_t hi) { return value < lo ? lo : value > hi ? hi : value; }
 /* The rank that owns item i. */
 int rc_owner(int64_t n, int64_t i, int size);
@@ -100,21 +100,21 @@ rcgns_status rc_exchange(MPI_Comm comm, rcgns_status mine, const void *send, con
 /* A node. Links are followed where that is possible: label, payload and children are those of the node they lead to. */
 typedef struct rc_node {
   char    name[RC_NAME], label[RC_NAME];
-  char    type[3];       /* of the payload: I4 I8 U4 U8 R4 R8 C1 B1 U1 X4 X8; MT: none */
-  char    kind;          /* of the payload: 'I' 'R' 'C' 'X'; '?': of no CGNS type; 0: none */
+  char    type[3];          /* of the payload: I4 I8 U4 U8 R4 R8 C1 B1; MT: none */
+  char    kind;             /* of the payload: 'I' 'R' 'C'; '?': another type; 0: none */
   bool    is_link, is_dead; /* dead: a link that leads nowhere */
-  int     file;          /* index of the file that holds the payload */
+  int     file;             /* index of the file that holds the payload */
   int     nd;
   int64_t dim[RC_MAX_DIMS];
   int64_t parent, child, last, next; /* indices of nodes, -1: none */
-  int64_t link_file, link_path; /* links: as stored, offsets of text in the pool */
-  int64_t anchor;        /* offset of the path in `file` where it is not the parent's path and the name; -1 */
-  int64_t small;         /* offset of the payload in the pool if it is small (int64_t, double or char), -1 */
+  int64_t link_file, link_path;      /* links: as stored, offsets of text in the pool */
+  int64_t anchor;                    /* offset of the path in `file` where it is not the parent's path and the name; -1 */
+  int64_t small;                     /* offset of the payload in the pool if it is small (int64_t, double or char), -1 */
 } rc_node;
 
 /* A file that the tree comes from: 0 is the one that was opened, the others are reached by links. */
 typedef struct rc_source {
-  int64_t path;          /* offset of text in the pool */
+  int64_t path; /* offset of text in the pool */
   bool    is_adf;
   int64_t size, device, inode;
 } rc_source;
@@ -153,7 +153,7 @@ int64_t rc_tree_find(const rc_tree *tree, int64_t parent, int64_t after, const c
 void rc_tree_string(const rc_tree *tree, int64_t node, char *out, size_t size);
 /* Rank 0's tree to all. Collective. */
 rcgns_status rc_tree_bcast(MPI_Comm comm, rc_tree *tree, rcgns_message *message);
-void rc_tree_drop(rc_tree *tree);
+void         rc_tree_drop(rc_tree *tree);
 
 /* ---- the two kinds of file ---------------------------------------------------------------------------------------- */
 
@@ -166,7 +166,7 @@ typedef struct rc_box {
 /* The whole payload of a node. */
 rc_box rc_whole(const rc_node *node);
 /* Cut the linear range [lo, hi) of the box into at most RC_MAX_BOXES boxes, in order. Returns how many. */
-int rc_box_cut(const rc_box *box, int64_t lo, int64_t hi, rc_box *part);
+int     rc_box_cut(const rc_box *box, int64_t lo, int64_t hi, rc_box *part);
 int64_t rc_box_count(const rc_box *box);
 
 /* Is it an HDF5 file? Not collective. */
@@ -204,64 +204,64 @@ typedef enum rc_layout {
 typedef struct rc_section {
   int64_t   connectivity, offsets, parents; /* nodes, -1: none */
   rc_layout layout;
-  bool      is_poly;      /* NFACE_n, or NGON_n in zone->face */
-  rc_shape  shape;        /* RC_FIXED */
-  int       npe;          /* RC_FIXED: nodes per element, mid nodes included */
-  int64_t   first;        /* element number of its first row */
-  int64_t   num_rows, length; /* rows, and values of ElementConnectivity */
-  int64_t   row_lo, row_hi;   /* rows that are no rind */
+  bool      is_poly;               /* NFACE_n, or NGON_n in zone->face */
+  rc_shape  shape;                 /* RC_FIXED */
+  int       npe;                   /* RC_FIXED: nodes per element, mid nodes included */
+  int64_t   first;                 /* element number of its first row */
+  int64_t   num_rows, length;      /* rows, and values of ElementConnectivity */
+  int64_t   row_lo, row_hi;        /* rows that are no rind */
   int64_t   num_cells, first_cell; /* volume cells; number of the first in its zone */
-  int64_t   num_cuts;     /* MIXED, INLINE: one cut for each RC_CUT rows and one at the end */
-  int64_t  *cut_at;       /* [num_cuts] where that row begins */
-  int64_t  *cut_cell;     /* [num_cuts] volume cells before it */
+  int64_t   num_cuts;              /* MIXED, INLINE: one cut for each RC_CUT rows and one at the end */
+  int64_t  *cut_at;                /* [num_cuts] where that row begins */
+  int64_t  *cut_cell;              /* [num_cuts] volume cells before it */
 } rc_section;
 
 enum { RC_CUT = 1024 };
 
 typedef struct rc_zone {
-  int64_t     node, base;    /* in the tree */
-  const char *name;          /* "Base/Zone", in the file's names */
+  int64_t     node, base; /* in the tree */
+  const char *name;       /* "Base/Zone", in the file's names */
   bool        is_structured;
   int64_t     vertices[3], cells[3]; /* along i, j, k; unstructured: the first only */
   int64_t     num_nodes, num_cells, first_cell;
-  int64_t     coordinate[3]; /* nodes */
-  int64_t     rind[6];       /* of the coordinates: i before, i after, ... */
+  int64_t     coordinate[3];           /* nodes */
+  int64_t     rind[6];                 /* of the coordinates: i before, i after, ... */
   int64_t     num_sections, num_faces; /* faces: rows of all of face */
-  rc_section *section;       /* [num_sections] by element number; cells */
+  rc_section *section;                 /* [num_sections] by element number; cells */
   int64_t     num_face_sections;
-  rc_section *face;          /* [num_face_sections] NGON_n by element number */
-  bool        by_parents;    /* the cells come from ParentElements alone */
-  int64_t     parent_base;   /* by_parents: what ParentElements calls the first cell */
+  rc_section *face;        /* [num_face_sections] NGON_n by element number */
+  bool        by_parents;  /* the cells come from ParentElements alone */
+  int64_t     parent_base; /* by_parents: what ParentElements calls the first cell */
 } rc_zone;
 
 /* This rank's mesh while it grows. */
 typedef struct rc_mesh {
-  rc_array xyz;              /* double[3] */
+  rc_array xyz;                                                             /* double[3] */
   rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
 } rc_mesh;
 
 struct rcgns_file {
-  MPI_Comm   comm;
-  int        rank, size;
-  char      *path;
-  rc_tree    tree;
-  int64_t   *handle;         /* [sources], -1: not open */
-  double     version;
-  double     map[3][4];      /* coordinates: scale and transform in one */
-  int64_t    num_zones;
-  rc_zone   *zone;
-  int64_t    num_cells, cell_lo, cell_hi; /* all ranks; this rank */
-  rc_mesh    build;
-  remap_mesh mesh;
-  const char **zone_name;
-  int64_t   *zone_cell_offset;
-  rc_array   names;          /* char *, owned: every string that info hands out */
-  rc_array   bases, notes;   /* const char *, in names */
+  MPI_Comm         comm;
+  int              rank, size;
+  char            *path;
+  rc_tree          tree;
+  int64_t         *handle; /* [sources], -1: not open */
+  double           version;
+  double           map[3][4]; /* coordinates: scale and transform in one */
+  int64_t          num_zones;
+  rc_zone         *zone;
+  int64_t          num_cells, cell_lo, cell_hi; /* all ranks; this rank */
+  rc_mesh          build;
+  remap_mesh       mesh;
+  const char     **zone_name;
+  int64_t         *zone_cell_offset;
+  rc_array         names;        /* char *, owned: every string that info hands out */
+  rc_array         bases, notes; /* const char *, in names */
   rcgns_zone_info *zone_info;
-  rcgns_info info;
-  int64_t   *solution;       /* [num_zones] node of the chosen FlowSolution_t, -1 */
-  rcgns_field *field;
-  int64_t    num_fields;
+  rcgns_info       info;
+  int64_t         *solution; /* [num_zones] node of the chosen FlowSolution_t, -1 */
+  rcgns_field     *field;
+  int64_t          num_fields;
 };
 
 /* A copy of the text, owned by the file; NULL: no memory. */
@@ -295,8 +295,8 @@ bool rc_rind(const rc_tree *tree, int64_t parent, int nd, int64_t *rind);
 rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message);
 
 /* Coordinates of nodes of an unstructured zone. Collective. xyz [n][3]; shared, if not NULL, [n]: more ranks than one ask. */
-rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n, double *xyz,
-                            uint8_t *shared, rcgns_message *message);
+rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n,
+                            double *xyz, uint8_t *shared, rcgns_message *message);
 /* One face into the mesh: a loop of local nodes, false: no memory. */
 bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour);
 /* Faces of the cells [lo, hi) (numbers in the zone) of polyhedra; first_cell is the local number of cell lo. Collective. */
@@ -311,16 +311,16 @@ typedef enum rc_content { RC_EMPTY, RC_LITERAL, RC_COPY, RC_VALUES, RC_LINK } rc
 
 /* A node of the file to be. */
 typedef struct rc_entry {
-  int64_t     parent;        /* entry; -1: the root of the file */
+  int64_t     parent; /* entry; -1: the root of the file */
   char        name[RC_NAME], label[RC_NAME], type[3];
   int         nd;
   int64_t     dim[RC_MAX_DIMS];
   rc_content  content;
-  const void *literal;       /* LITERAL: int64_t, double or char by kind; borrowed */
-  char        kind;          /* LITERAL */
-  int64_t     node;          /* COPY: of the tree */
-  int64_t     origin[RC_MAX_DIMS]; /* COPY: of the box that is taken */
-  int64_t     zone, field;   /* VALUES */
+  const void *literal;               /* LITERAL: int64_t, double or char by kind; borrowed */
+  char        kind;                  /* LITERAL */
+  int64_t     node;                  /* COPY: of the tree */
+  int64_t     origin[RC_MAX_DIMS];   /* COPY: of the box that is taken */
+  int64_t     zone, field;           /* VALUES */
   char       *link_file, *link_path; /* LINK: owned; an empty file is this one */
 } rc_entry;
 
@@ -332,7 +332,7 @@ typedef struct rc_plan {
 int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char *label, const char *type, int nd,
                     const int64_t *dim, char kind, const void *literal);
 static inline rc_entry *rc_entry_at(const rc_plan *plan, int64_t i) { return (rc_entry *)plan->entry.item + i; }
-void rc_plan_drop(rc_plan *plan);
+void                    rc_plan_drop(rc_plan *plan);
 
 /* A new file with every group, attribute and literal of the plan, and room for the rest. Not collective. */
 rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message *message);

@@ -25,10 +25,7 @@ void rcgns_options_default(rcgns_options *options)
   *options = (rcgns_options){.scale = 1.0, .transform = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 }
 
-void rcgns_choice_default(rcgns_choice *choice)
-{
-  *choice = (rcgns_choice){.name = NULL};
-}
+void rcgns_choice_default(rcgns_choice *choice) { *choice = (rcgns_choice){.name = NULL}; }
 
 rcgns_status rc_fail(rcgns_message *message, rcgns_status status, const char *format, ...)
 {

@@ -70,8 +70,8 @@ static rcgns_status check_box(const rcgns_file *file, int64_t node, const rc_box
 }
 
 /* This rank's part of a read. */
-static rcgns_status read_mine(const rcgns_file *file, int64_t node, const rc_box *box, int64_t lo, int64_t hi, char as, void *out,
-                              rcgns_message *message)
+static rcgns_status read_mine(const rcgns_file *file, int64_t node, const rc_box *box, int64_t lo, int64_t hi, char as,
+                              void *out, rcgns_message *message)
 {
   const rc_node *n      = rc_node_at(&file->tree, node);
   const size_t   width  = as == 'N' ? (size_t)rc_width(n->type) : sizeof(int64_t);
@@ -82,7 +82,8 @@ static rcgns_status read_mine(const rcgns_file *file, int64_t node, const rc_box
   rcgns_message  why;
 
   if (lo >= hi) return RCGNS_OK;
-  if (lo < 0 || hi > rc_box_count(box)) return rc_fail(message, RCGNS_IO, "%s: array %s is smaller than its zone needs", file->path, n->name);
+  if (lo < 0 || hi > rc_box_count(box))
+    return rc_fail(message, RCGNS_IO, "%s: array %s is smaller than its zone needs", file->path, n->name);
   path = rc_tree_path(&file->tree, node);
   if (!path) return rc_no_memory(message);
   for (int64_t from = lo; from < hi && status == RCGNS_OK; from += ROUND) {
@@ -154,8 +155,8 @@ static rcgns_status open_all(rcgns_file *file, rcgns_message *message)
     const rc_source *source = rc_source_at(&file->tree, i);
     const char      *path   = rc_text(&file->tree, source->path);
 
-    status = source->is_adf ? rc_adf_open(path, &file->handle[i], message)
-                            : rc_h5_open(file->comm, path, &file->handle[i], message);
+    status =
+        source->is_adf ? rc_adf_open(path, &file->handle[i], message) : rc_h5_open(file->comm, path, &file->handle[i], message);
     status = rc_agree(file->comm, status, message);
   }
   return status;
@@ -202,25 +203,25 @@ static rcgns_status fill_info(rcgns_file *file, rcgns_message *message)
   for (int64_t z = 0; z < file->num_zones; z++) {
     const rc_zone *zone = file->zone + z;
 
-    file->zone_info[z] = (rcgns_zone_info){.name          = zone->name,
-                                           .is_structured = zone->is_structured,
-                                           .num_nodes     = zone->num_nodes,
-                                           .num_cells     = zone->num_cells,
-                                           .first_cell    = zone->first_cell};
+    file->zone_info[z]        = (rcgns_zone_info){.name          = zone->name,
+                                                  .is_structured = zone->is_structured,
+                                                  .num_nodes     = zone->num_nodes,
+                                                  .num_cells     = zone->num_cells,
+                                                  .first_cell    = zone->first_cell};
     file->zone_name[z]        = zone->name;
     file->zone_cell_offset[z] = zone->first_cell;
     file->solution[z]         = -1;
     if (!keep_in(file, &file->bases, rc_node_at(&file->tree, zone->base)->name)) return rc_no_memory(message);
   }
   file->zone_cell_offset[file->num_zones] = file->num_cells;
-  info->path      = file->path;
-  info->format    = rc_source_at(&file->tree, 0)->is_adf ? "ADF" : "HDF5";
-  info->version   = file->version;
-  info->num_cells = file->num_cells;
-  info->num_bases = file->bases.count;
-  info->base      = file->bases.item;
-  info->num_zones = file->num_zones;
-  info->zone      = file->zone_info;
+  info->path                              = file->path;
+  info->format                            = rc_source_at(&file->tree, 0)->is_adf ? "ADF" : "HDF5";
+  info->version                           = file->version;
+  info->num_cells                         = file->num_cells;
+  info->num_bases                         = file->bases.count;
+  info->base                              = file->bases.item;
+  info->num_zones                         = file->num_zones;
+  info->zone                              = file->zone_info;
   return RCGNS_OK;
 }
 
@@ -262,15 +263,9 @@ rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *op
   return status;
 }
 
-const rcgns_info *rcgns_get_info(const rcgns_file *file)
-{
-  return &file->info;
-}
+const rcgns_info *rcgns_get_info(const rcgns_file *file) { return &file->info; }
 
-const remap_mesh *rcgns_mesh(const rcgns_file *file)
-{
-  return &file->mesh;
-}
+const remap_mesh *rcgns_mesh(const rcgns_file *file) { return &file->mesh; }
 
 void rcgns_close(rcgns_file **address)
 {

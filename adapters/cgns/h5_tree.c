@@ -14,13 +14,10 @@
 
 enum { MAX_DEPTH = 100, MAX_NODES = 1 << 24 };
 
-#define QUIETLY(statement) \
-  do {                     \
-    H5E_BEGIN_TRY          \
-    {                      \
-      statement;           \
-    }                      \
-    H5E_END_TRY            \
+#define QUIETLY(statement)       \
+  do {                           \
+    H5E_BEGIN_TRY { statement; } \
+    H5E_END_TRY                  \
   } while (0)
 
 /* The walk's files: opened once each. */
@@ -51,8 +48,9 @@ static void read_attribute(hid_t group, const char *name, char *out, size_t size
   if (H5Aexists(group, name) <= 0 || (attribute = H5Aopen(group, name, H5P_DEFAULT)) < 0) return;
   stored = H5Aget_type(attribute);
   memory = H5Tcopy(H5T_C_S1);
-  if (H5Tget_class(stored) == H5T_STRING && H5Tis_variable_str(stored) == 0 && H5Aget_storage_size(attribute) == H5Tget_size(stored) &&
-      H5Tset_size(memory, size) >= 0 && H5Aread(attribute, memory, out) < 0)
+  if (H5Tget_class(stored) == H5T_STRING && H5Tis_variable_str(stored) == 0 &&
+      H5Aget_storage_size(attribute) == H5Tget_size(stored) && H5Tset_size(memory, size) >= 0 &&
+      H5Aread(attribute, memory, out) < 0)
     memset(out, 0, size);
   out[size - 1] = 0;
   for (size_t n = strlen(out); n && out[n - 1] == ' '; n--) out[n - 1] = 0;
@@ -64,9 +62,9 @@ static void read_attribute(hid_t group, const char *name, char *out, size_t size
 static hid_t memory_type(char as, const char *type)
 {
   switch (as) {
-  case 'I': return H5T_NATIVE_INT64;
-  case 'R': return H5T_NATIVE_DOUBLE;
-  default: break;
+    case 'I': return H5T_NATIVE_INT64;
+    case 'R': return H5T_NATIVE_DOUBLE;
+    default: break;
   }
   if (!strcmp(type, "I4")) return H5T_NATIVE_INT32;
   if (!strcmp(type, "I8")) return H5T_NATIVE_INT64;
@@ -82,10 +80,10 @@ static hid_t memory_type(char as, const char *type)
 /* What the dataset really holds, whatever the node's type says. */
 static void classify(hid_t data, rc_node *n)
 {
-  const hid_t       type  = H5Dget_type(data);
+  const hid_t type        = H5Dget_type(data);
   const H5T_class_t class = H5Tget_class(type);
-  const size_t      size  = H5Tget_size(type);
-  const char       *real  = NULL;
+  const size_t size       = H5Tget_size(type);
+  const char  *real       = NULL;
 
   if (class == H5T_INTEGER && size == 1) real = n->type[0] == 'B' || n->type[0] == 'U' ? "B1" : "C1";
   if (class == H5T_INTEGER && size == 4) real = H5Tget_sign(type) == H5T_SGN_NONE ? "U4" : "I4";
@@ -103,11 +101,11 @@ static void classify(hid_t data, rc_node *n)
 /* Does the file hold as many bytes as the dataset claims? Compression gains a factor of about 1000 at most. */
 static bool is_plausible(hid_t data, const rc_node *n, int64_t file_size)
 {
-  const hid_t   list     = H5Dget_create_plist(data);
-  const bool    chunked  = H5Pget_layout(list) == H5D_CHUNKED;
+  const hid_t   list      = H5Dget_create_plist(data);
+  const bool    chunked   = H5Pget_layout(list) == H5D_CHUNKED;
   const bool    elsewhere = H5Pget_external_count(list) > 0 || H5Pget_layout(list) == H5D_VIRTUAL;
-  const hsize_t stored   = H5Dget_storage_size(data);
-  const int64_t count    = rc_count(n);
+  const hsize_t stored    = H5Dget_storage_size(data);
+  const int64_t count     = rc_count(n);
 
   H5Pclose(list);
   return !elsewhere && stored > 0 && count > 0 && count <= (chunked ? 1100 : 1) * file_size;
@@ -190,11 +188,11 @@ static int source_at(walker *w, const char *path)
 /* A linked file's path: relative ones begin at the folder of the file with the link. The caller frees. */
 static char *linked_path(const walker *w, int from, const char *file)
 {
-  const char *here   = path_of(w, from);
-  const char *slash  = strrchr(here, '/');
-  const int   folder = *file == '/' || !slash ? 0 : (int)(slash - here) + 1;
-  const size_t size  = (size_t)folder + strlen(file) + 1;
-  char       *path   = malloc(size);
+  const char  *here   = path_of(w, from);
+  const char  *slash  = strrchr(here, '/');
+  const int    folder = *file == '/' || !slash ? 0 : (int)(slash - here) + 1;
+  const size_t size   = (size_t)folder + strlen(file) + 1;
+  char        *path   = malloc(size);
 
   if (path) snprintf(path, size, "%.*s%s", folder, here, file);
   return path;
@@ -307,19 +305,20 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
 /* The children in the order of their making, or by name where the file does not keep it. */
 static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source, int depth)
 {
-  names        list  = {{.item = NULL}};
-  unsigned     flags = 0;
-  hid_t        made  = H5Gget_create_plist(group);
+  names        list   = {{.item = NULL}};
+  unsigned     flags  = 0;
+  hid_t        made   = H5Gget_create_plist(group);
   rcgns_status status = RCGNS_OK;
 
   H5Pget_link_creation_order(made, &flags);
   H5Pclose(made);
-  if (H5Literate(group, flags & H5P_CRT_ORDER_TRACKED ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME, H5_ITER_INC, NULL, collect, &list) < 0)
+  if (H5Literate(group, flags & H5P_CRT_ORDER_TRACKED ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME, H5_ITER_INC, NULL, collect, &list) <
+      0)
     status = rc_fail(w->message, RCGNS_IO, "%s: cannot list the children of node %s: is the file complete?", path_of(w, source),
                      rc_node_at(w->tree, me)->name);
   for (int64_t i = 0; i < list.name.count; i++) {
-    char      *name  = ((char **)list.name.item)[i];
-    rc_node    n     = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
+    char      *name = ((char **)list.name.item)[i];
+    rc_node    n    = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
     H5O_info_t info;
     hid_t      child = -1;
 
@@ -338,8 +337,8 @@ static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source
 static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int depth)
 {
   char        *found = NULL, *file = NULL, *path = NULL;
-  hid_t        at    = group;
-  int64_t      me    = -1;
+  hid_t        at     = group;
+  int64_t      me     = -1;
   rcgns_status status = RCGNS_OK;
 
   if (depth > MAX_DEPTH || w->tree->node.count > MAX_NODES)
@@ -384,7 +383,7 @@ static rcgns_status walk_all(walker *w)
     return rc_no_memory(w->message);
   }
   ((hid_t *)w->file.item)[w->file.count++] = file;
-  group = H5Gopen2(file, "/", H5P_DEFAULT);
+  group                                    = H5Gopen2(file, "/", H5P_DEFAULT);
   if (group < 0) return rc_fail(w->message, RCGNS_IO, "%s: it has no root group: the file is damaged", path);
   status = walk(w, group, -1, root, 0);
   H5Gclose(group);
@@ -413,13 +412,11 @@ rcgns_status rc_h5_open(MPI_Comm comm, const char *path, int64_t *handle, rcgns_
   QUIETLY(file = H5Fopen(path, H5F_ACC_RDONLY, access));
   H5Pclose(access);
   *handle = (int64_t)file;
-  return file < 0 ? rc_fail(message, RCGNS_IO, "%s: cannot be opened by all ranks: do they see the same file system?", path) : RCGNS_OK;
+  return file < 0 ? rc_fail(message, RCGNS_IO, "%s: cannot be opened by all ranks: do they see the same file system?", path)
+                  : RCGNS_OK;
 }
 
-void rc_h5_close(int64_t handle)
-{
-  QUIETLY(H5Fclose((hid_t)handle));
-}
+void rc_h5_close(int64_t handle) { QUIETLY(H5Fclose((hid_t)handle)); }
 
 /* Select [lo, hi) of the box in a dataset's space. */
 static bool select_range(hid_t space, const rc_box *box, int64_t lo, int64_t hi)

@@ -18,13 +18,10 @@
 
 enum { COPY_ROUND = 1 << 22, WRITE_ROUND = 1 << 26 }; /* values of one rank in one transfer */
 
-#define QUIETLY(statement) \
-  do {                     \
-    H5E_BEGIN_TRY          \
-    {                      \
-      statement;           \
-    }                      \
-    H5E_END_TRY            \
+#define QUIETLY(statement)       \
+  do {                           \
+    H5E_BEGIN_TRY { statement; } \
+    H5E_END_TRY                  \
   } while (0)
 
 static hid_t stored_type(const char *type)
@@ -70,8 +67,8 @@ typedef struct maker {
 
 static void text_attribute(maker *m, hid_t group, const char *name, const char *value, size_t size)
 {
-  const hid_t type      = H5Tcopy(H5T_C_S1);
-  const hid_t space     = H5Screate(H5S_SCALAR);
+  const hid_t type            = H5Tcopy(H5T_C_S1);
+  const hid_t space           = H5Screate(H5S_SCALAR);
   char        padded[RC_NAME] = "";
   hid_t       attribute;
 
@@ -103,7 +100,8 @@ static void flags_attribute(maker *m, hid_t group)
   H5Sclose(space);
 }
 
-static void dataset(maker *m, hid_t group, const char *name, hid_t type, int nd, const int64_t *dim, hid_t memory, const void *values)
+static void dataset(maker *m, hid_t group, const char *name, hid_t type, int nd, const int64_t *dim, hid_t memory,
+                    const void *values)
 {
   hsize_t dims[RC_MAX_DIMS];
   hid_t   space, data;
@@ -152,7 +150,10 @@ static void make_entry(maker *m, const rc_plan *plan, int64_t i)
     link_datasets(m, group, e);
   else if (e->content == RC_LITERAL)
     dataset(m, group, " data", stored_type(e->type), e->nd, e->dim,
-            e->kind == 'I' ? H5T_NATIVE_INT64 : e->kind == 'R' ? H5T_NATIVE_DOUBLE : stored_type(e->type), e->literal);
+            e->kind == 'I'   ? H5T_NATIVE_INT64
+            : e->kind == 'R' ? H5T_NATIVE_DOUBLE
+                             : stored_type(e->type),
+            e->literal);
   else if (e->content != RC_EMPTY)
     dataset(m, group, " data", stored_type(e->type), e->nd, e->dim, -1, NULL);
   H5Gclose(group);
@@ -194,7 +195,8 @@ static int ask_space(const char *path, int64_t bytes)
   struct statvfs disk;
   struct rlimit  limit;
 
-  if (!getrlimit(RLIMIT_FSIZE, &limit) && limit.rlim_cur != RLIM_INFINITY && (uint64_t)limit.rlim_cur < (uint64_t)bytes) return EFBIG;
+  if (!getrlimit(RLIMIT_FSIZE, &limit) && limit.rlim_cur != RLIM_INFINITY && (uint64_t)limit.rlim_cur < (uint64_t)bytes)
+    return EFBIG;
   if (!statvfs(path, &disk) && disk.f_frsize && (uint64_t)disk.f_bavail < (uint64_t)bytes / disk.f_frsize) return ENOSPC;
   return 0;
 }
@@ -214,8 +216,8 @@ static int make_file(const char *path, const rc_plan *plan)
 {
   const unsigned order  = H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED;
   const hid_t    access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
-  maker          m      = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true};
-  hsize_t        size   = 0;
+  maker          m    = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true};
+  hsize_t        size = 0;
   int            error;
 
   H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
@@ -258,8 +260,8 @@ rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message
 /* Write [lo, hi) of the whole of a dataset, counted along its values; every rank takes part. */
 static bool write_range(hid_t data, const rc_box *box, int64_t lo, int64_t hi, hid_t memory, const void *values)
 {
-  const hsize_t count    = lo < hi ? (hsize_t)(hi - lo) : 0;
-  const hid_t   space    = H5Dget_space(data), shape = H5Screate_simple(1, &count, NULL), transfer = H5Pcreate(H5P_DATASET_XFER);
+  const hsize_t count = lo < hi ? (hsize_t)(hi - lo) : 0;
+  const hid_t   space = H5Dget_space(data), shape = H5Screate_simple(1, &count, NULL), transfer = H5Pcreate(H5P_DATASET_XFER);
   const char    nothing[16] = {0};
   rc_box        part[RC_MAX_BOXES];
   const int     parts = rc_box_cut(box, lo, hi, part);
@@ -285,17 +287,18 @@ static bool write_range(hid_t data, const rc_box *box, int64_t lo, int64_t hi, h
 
 static rcgns_status write_failed(const rcgns_file *file, bool ok, const char *name, rcgns_message *message)
 {
-  return rc_agree(file->comm, ok ? RCGNS_OK : rc_fail(message, RCGNS_IO, "cannot write array %s: is the disk full?", name), message);
+  return rc_agree(file->comm, ok ? RCGNS_OK : rc_fail(message, RCGNS_IO, "cannot write array %s: is the disk full?", name),
+                  message);
 }
 
 /* Copy a large array, each rank its share, in rounds. Collective. */
 static rcgns_status copy_array(rcgns_file *file, hid_t data, const rc_entry *e, rcgns_message *message)
 {
-  rc_box        from = {.nd = e->nd}, to = {.nd = e->nd};
-  const int     width = rc_width(e->type);
-  int64_t       total = 1, lo, hi, rounds;
-  char         *block;
-  rcgns_status  status;
+  rc_box       from = {.nd = e->nd}, to = {.nd = e->nd};
+  const int    width = rc_width(e->type);
+  int64_t      total = 1, lo, hi, rounds;
+  char        *block;
+  rcgns_status status;
 
   for (int d = 0; d < e->nd; d++) {
     from.origin[d] = e->origin[d];
@@ -319,7 +322,8 @@ static rcgns_status copy_array(rcgns_file *file, hid_t data, const rc_entry *e, 
 }
 
 /* Write a field of one zone from the ranks that hold its cells. Collective. */
-static rcgns_status write_values(rcgns_file *file, hid_t data, const rc_entry *e, const rcgns_new_field *fields, rcgns_message *message)
+static rcgns_status write_values(rcgns_file *file, hid_t data, const rc_entry *e, const rcgns_new_field *fields,
+                                 rcgns_message *message)
 {
   const rc_zone *zone   = file->zone + e->zone;
   const int64_t  lo     = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells);
@@ -361,7 +365,8 @@ static rcgns_status fill_entry(rcgns_file *file, hid_t out, const rc_plan *plan,
   return status;
 }
 
-static rcgns_status fill_file(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields, rcgns_message *message)
+static rcgns_status fill_file(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields,
+                              rcgns_message *message)
 {
   const hid_t  access = H5Pcreate(H5P_FILE_ACCESS);
   hid_t        out;
@@ -382,7 +387,8 @@ static rcgns_status fill_file(rcgns_file *file, const char *path, const rc_plan 
   return status == RCGNS_OK ? write_failed(file, closed, "(the file)", message) : status;
 }
 
-rcgns_status rc_h5_fill(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields, rcgns_message *message)
+rcgns_status rc_h5_fill(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields,
+                        rcgns_message *message)
 {
   rcgns_status status = RCGNS_OK;
 

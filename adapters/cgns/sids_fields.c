@@ -14,21 +14,49 @@
 static const struct {
   const char  *pattern;
   remap_nature nature;
-} NATURE[] = { /* the first match counts */
-  {"Iblank", REMAP_FLAG}, {"iblank", REMAP_FLAG}, {"cellN", REMAP_FLAG}, {"cellNF", REMAP_FLAG}, {"ChimeraCellType", REMAP_FLAG},
-  {"status", REMAP_FLAG}, {"globalCell", REMAP_FLAG}, {"PID", REMAP_FLAG}, {"Shock", REMAP_FLAG},
-  {"Res*", REMAP_VOLUME_MEAN}, {"GridVelocity*", REMAP_VOLUME_MEAN}, {"CoefPressure*", REMAP_VOLUME_MEAN},
-  {"Pressure*", REMAP_VOLUME_MEAN}, {"Temperature*", REMAP_VOLUME_MEAN}, {"Mach*", REMAP_VOLUME_MEAN},
-  {"Viscosity*", REMAP_VOLUME_MEAN}, {"Vorticity*", REMAP_VOLUME_MEAN}, {"TurbulentDistance*", REMAP_VOLUME_MEAN},
-  {"VelocitySound*", REMAP_VOLUME_MEAN}, {"Density", REMAP_CONSERVED}, {"Momentum*", REMAP_CONSERVED}, {"RotatingMomentum*", REMAP_CONSERVED},
-  {"EnergyStagnationDensity", REMAP_CONSERVED}, {"RotatingEnergyStagnationDensity", REMAP_CONSERVED},
-  {"SpeciesDensity*", REMAP_CONSERVED}, {"*Density", REMAP_CONSERVED}, {"Energy", REMAP_CONSERVED},
-  {"Velocity*", REMAP_MASS_SPECIFIC}, {"RotatingVelocity*", REMAP_MASS_SPECIFIC}, {"EnergyInternal", REMAP_MASS_SPECIFIC},
-  {"EnergyKinetic", REMAP_MASS_SPECIFIC}, {"EnergyStagnation", REMAP_MASS_SPECIFIC}, {"Enthalpy*", REMAP_MASS_SPECIFIC},
-  {"Entropy*", REMAP_MASS_SPECIFIC}, {"MassFraction*", REMAP_MASS_SPECIFIC}, {"MoleFraction*", REMAP_MASS_SPECIFIC},
-  {"TurbulentEnergyKinetic", REMAP_MASS_SPECIFIC}, {"TurbulentDissipation", REMAP_MASS_SPECIFIC},
-  {"TurbulentDissipationRate", REMAP_MASS_SPECIFIC}, {"TurbulentSANuTilde", REMAP_MASS_SPECIFIC},
-  {"ReynoldsStress*", REMAP_MASS_SPECIFIC}, {"Intermittency", REMAP_MASS_SPECIFIC}};
+} NATURE[] = {/* the first match counts */
+              {"Iblank", REMAP_FLAG},
+              {"iblank", REMAP_FLAG},
+              {"cellN", REMAP_FLAG},
+              {"cellNF", REMAP_FLAG},
+              {"ChimeraCellType", REMAP_FLAG},
+              {"status", REMAP_FLAG},
+              {"globalCell", REMAP_FLAG},
+              {"PID", REMAP_FLAG},
+              {"Shock", REMAP_FLAG},
+              {"Res*", REMAP_VOLUME_MEAN},
+              {"GridVelocity*", REMAP_VOLUME_MEAN},
+              {"CoefPressure*", REMAP_VOLUME_MEAN},
+              {"Pressure*", REMAP_VOLUME_MEAN},
+              {"Temperature*", REMAP_VOLUME_MEAN},
+              {"Mach*", REMAP_VOLUME_MEAN},
+              {"Viscosity*", REMAP_VOLUME_MEAN},
+              {"Vorticity*", REMAP_VOLUME_MEAN},
+              {"TurbulentDistance*", REMAP_VOLUME_MEAN},
+              {"VelocitySound*", REMAP_VOLUME_MEAN},
+              {"Density", REMAP_CONSERVED},
+              {"Momentum*", REMAP_CONSERVED},
+              {"RotatingMomentum*", REMAP_CONSERVED},
+              {"EnergyStagnationDensity", REMAP_CONSERVED},
+              {"RotatingEnergyStagnationDensity", REMAP_CONSERVED},
+              {"SpeciesDensity*", REMAP_CONSERVED},
+              {"*Density", REMAP_CONSERVED},
+              {"Energy", REMAP_CONSERVED},
+              {"Velocity*", REMAP_MASS_SPECIFIC},
+              {"RotatingVelocity*", REMAP_MASS_SPECIFIC},
+              {"EnergyInternal", REMAP_MASS_SPECIFIC},
+              {"EnergyKinetic", REMAP_MASS_SPECIFIC},
+              {"EnergyStagnation", REMAP_MASS_SPECIFIC},
+              {"Enthalpy*", REMAP_MASS_SPECIFIC},
+              {"Entropy*", REMAP_MASS_SPECIFIC},
+              {"MassFraction*", REMAP_MASS_SPECIFIC},
+              {"MoleFraction*", REMAP_MASS_SPECIFIC},
+              {"TurbulentEnergyKinetic", REMAP_MASS_SPECIFIC},
+              {"TurbulentDissipation", REMAP_MASS_SPECIFIC},
+              {"TurbulentDissipationRate", REMAP_MASS_SPECIFIC},
+              {"TurbulentSANuTilde", REMAP_MASS_SPECIFIC},
+              {"ReynoldsStress*", REMAP_MASS_SPECIFIC},
+              {"Intermittency", REMAP_MASS_SPECIFIC}};
 
 remap_nature rcgns_nature(const char *name, int is_integer, int *known)
 {
@@ -117,8 +145,8 @@ static void list_solutions(const rcgns_file *file, const rc_zone *zone, words *o
 /* Why a node that was asked for cannot be used. */
 static rcgns_status check_usable(const rcgns_file *file, const rc_zone *zone, int64_t solution, rcgns_message *message)
 {
-  const rc_tree *tree = &file->tree;
-  const char    *name = rc_node_at(tree, solution)->name;
+  const rc_tree *tree   = &file->tree;
+  const char    *name   = rc_node_at(tree, solution)->name;
   words          fields = {.used = 0};
   char           location[RC_NAME];
 
@@ -126,11 +154,13 @@ static rcgns_status check_usable(const rcgns_file *file, const rc_zone *zone, in
   location_of(tree, solution, location, sizeof location);
   list_fields(tree, solution, &fields);
   if (!is_cell_centred(tree, solution))
-    return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s is %s-located (fields: %s): only CellCenter fields can be remapped",
-                   file->path, zone->name, name, location, fields.text);
-  if (next_field(tree, solution, -1) < 0) return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s holds no fields", file->path, zone->name, name);
-  return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s covers a part of the zone only (PointList or PointRange)", file->path,
-                 zone->name, name);
+    return rc_fail(message, RCGNS_IO,
+                   "%s: zone %s: solution %s is %s-located (fields: %s): only CellCenter fields can be remapped", file->path,
+                   zone->name, name, location, fields.text);
+  if (next_field(tree, solution, -1) < 0)
+    return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s holds no fields", file->path, zone->name, name);
+  return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s covers a part of the zone only (PointList or PointRange)",
+                 file->path, zone->name, name);
 }
 
 /* ---- choice ------------------------------------------------------------------------------------------------------- */
@@ -148,7 +178,8 @@ static rcgns_status choose_by_name(rcgns_file *file, const char *name, bool opti
     }
     if (at < 0) {
       list_solutions(file, zone, &have);
-      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no solution %s; it has: %s", file->path, zone->name, name, have.text);
+      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no solution %s; it has: %s", file->path, zone->name, name,
+                     have.text);
     }
     RC_TRY(check_usable(file, zone, at, message));
     file->solution[z] = at;
@@ -214,12 +245,14 @@ static rcgns_status choose_by_step(rcgns_file *file, int64_t step, rcgns_message
     }
     if (file->solution[z] < 0) {
       list_solutions(file, zone, &have);
-      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no CellCenter solution for step %s; it has: %s", file->path, zone->name,
-                     which, have.text);
+      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no CellCenter solution for step %s; it has: %s", file->path,
+                     zone->name, which, have.text);
     }
     RC_TRY(check_usable(file, zone, file->solution[z], message));
   }
-  return by_order ? rc_note(file, message, "no FlowSolutionPointers: steps are the CellCenter solutions in the order of the file") : RCGNS_OK;
+  return by_order
+             ? rc_note(file, message, "no FlowSolutionPointers: steps are the CellCenter solutions in the order of the file")
+             : RCGNS_OK;
 }
 
 /* Is there a usable node of that name in every zone? */
@@ -242,17 +275,19 @@ static rcgns_status explain_none(const rcgns_file *file, rcgns_message *message)
 
     if (nth_usable(file, zone, 1) >= 0) continue;
     for (int64_t at = -1; (at = rc_tree_find(&file->tree, zone->node, at, "FlowSolution_t", NULL)) >= 0;)
-      if (!is_cell_centred(&file->tree, at) && next_field(&file->tree, at, -1) >= 0) return check_usable(file, zone, at, message);
+      if (!is_cell_centred(&file->tree, at) && next_field(&file->tree, at, -1) >= 0)
+        return check_usable(file, zone, at, message);
     list_solutions(file, zone, &have);
-    return rc_fail(message, RCGNS_IO, "%s: zone %s: it holds no CellCenter solution with fields; it has: %s", file->path, zone->name, have.text);
+    return rc_fail(message, RCGNS_IO, "%s: zone %s: it holds no CellCenter solution with fields; it has: %s", file->path,
+                   zone->name, have.text);
   }
   return rc_fail(message, RCGNS_IO, "%s: no CellCenter solution has the same name in every zone: name one base", file->path);
 }
 
 static rcgns_status choose_only(rcgns_file *file, bool optional, rcgns_message *message)
 {
-  const char *only = NULL;
-  int64_t     num  = 0;
+  const char *only  = NULL;
+  int64_t     num   = 0;
   words       names = {.used = 0};
 
   for (int64_t at = -1; (at = rc_tree_find(&file->tree, file->zone->node, at, "FlowSolution_t", NULL)) >= 0;) {
@@ -263,7 +298,9 @@ static rcgns_status choose_only(rcgns_file *file, bool optional, rcgns_message *
     num++;
     add_word(&names, name);
   }
-  if (num > 1) return rc_fail(message, RCGNS_USAGE, "%s: it holds %lld CellCenter solutions: name one of %s", file->path, (long long)num, names.text);
+  if (num > 1)
+    return rc_fail(message, RCGNS_USAGE, "%s: it holds %lld CellCenter solutions: name one of %s", file->path, (long long)num,
+                   names.text);
   if (num) return choose_by_name(file, only, false, message);
   return optional ? RCGNS_OK : explain_none(file, message);
 }
@@ -379,7 +416,9 @@ rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values
     const int64_t array = array_of(file, z, name);
     rc_box        box;
 
-    if (array < 0) return rc_fail(message, RCGNS_IO, "%s: zone %s: field %s is missing there: leave it out (--fields)", file->path, file->zone[z].name, name);
+    if (array < 0)
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: field %s is missing there: leave it out (--fields)", file->path,
+                     file->zone[z].name, name);
     if (!core_of(file, file->zone + z, file->solution[z], array, &box))
       return rc_fail(message, RCGNS_IO, "%s: zone %s: the size of field %s does not match the zone's %lld cells", file->path,
                      file->zone[z].name, name, (long long)file->zone[z].num_cells);
@@ -387,8 +426,9 @@ rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values
   for (int64_t z = 0; z < file->num_zones; z++) {
     const rc_zone *zone  = file->zone + z;
     const int64_t  array = array_of(file, z, name);
-    const int64_t  lo = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells), hi = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
-    rc_box         box;
+    const int64_t  lo    = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells),
+                  hi     = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
+    rc_box box;
 
     core_of(file, zone, file->solution[z], array, &box);
     RC_TRY(rc_read(file, RCGNS_OK, array, &box, lo, hi, 'R', values, message));

@@ -19,10 +19,10 @@ static const int8_t PENTA[][4] = {{0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}, {0, 
 static const int8_t HEXA[][4]  = {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {0, 4, 7, 3}, {4, 5, 6, 7}};
 
 static const struct {
-  int            num;
+  int num;
   const int8_t (*face)[4];
-} ELEMENT[] = {
-  [RC_NONE] = {0, NULL}, [RC_TETRA] = {4, TETRA}, [RC_PYRA] = {5, PYRA}, [RC_PENTA] = {5, PENTA}, [RC_HEXA] = {6, HEXA}};
+} ELEMENT[] =
+    {[RC_NONE] = {0, NULL}, [RC_TETRA] = {4, TETRA}, [RC_PYRA] = {5, PYRA}, [RC_PENTA] = {5, PENTA}, [RC_HEXA] = {6, HEXA}};
 
 bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour)
 {
@@ -47,7 +47,8 @@ double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *
     double        p[3], q[3];
 
     for (int d = 0; d < 3; d++) p[d] = a[d] - origin[d], q[d] = b[d] - origin[d];
-    sum += mean[0] * (p[1] * q[2] - p[2] * q[1]) + mean[1] * (p[2] * q[0] - p[0] * q[2]) + mean[2] * (p[0] * q[1] - p[1] * q[0]);
+    sum +=
+        mean[0] * (p[1] * q[2] - p[2] * q[1]) + mean[1] * (p[2] * q[0] - p[0] * q[2]) + mean[2] * (p[0] * q[1] - p[1] * q[0]);
   }
   return sum;
 }
@@ -90,8 +91,9 @@ static rcgns_status place_all(const rcgns_file *file, const rc_zone *zone, int64
     else
       ok = place(file, at, xyz + 3 * i) && ok;
     if (!ok)
-      return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: node %lld has a coordinate that is not a finite number: repair the mesh",
-                     file->path, zone->name, (long long)(first + i + 1));
+      return rc_fail(message, RCGNS_GEOMETRY,
+                     "%s: zone %s: node %lld has a coordinate that is not a finite number: repair the mesh", file->path,
+                     zone->name, (long long)(first + i + 1));
   }
   return RCGNS_OK;
 }
@@ -110,7 +112,7 @@ static patch patch_of(const rc_zone *zone, int64_t lo, int64_t hi)
   patch         p = {0, 0, 0, 0, 0};
 
   if (lo >= hi) return p;
-  p        = (patch){.rows = zone->vertices[1], .k0 = k0, .planes = k1 - k0 + 2};
+  p = (patch){.rows = zone->vertices[1], .k0 = k0, .planes = k1 - k0 + 2};
   if (k0 == k1) {
     p.j0   = lo % layer / ci;
     p.rows = (hi - 1) % layer / ci - p.j0 + 2;
@@ -120,14 +122,12 @@ static patch patch_of(const rc_zone *zone, int64_t lo, int64_t hi)
 }
 
 /* One coordinate of the patch: a slab of planes or, within one layer, of rows in two planes. Collective. */
-static rcgns_status read_patch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const patch *p, int64_t node, double *out,
-                               rcgns_message *message)
+static rcgns_status read_patch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const patch *p, int64_t node,
+                               double *out, rcgns_message *message)
 {
   const int64_t ni = zone->vertices[0], nj = zone->vertices[1];
-  const rc_box  box = {.nd     = 3,
-                       .origin = {zone->rind[4], zone->rind[2], zone->rind[0]},
-                       .shape  = {zone->vertices[2], nj, ni}};
-  const int64_t from  = (p->k0 * nj + p->j0) * ni;
+  const rc_box  box  = {.nd = 3, .origin = {zone->rind[4], zone->rind[2], zone->rind[0]}, .shape = {zone->vertices[2], nj, ni}};
+  const int64_t from = (p->k0 * nj + p->j0) * ni;
   const int64_t first = p->rows < nj ? p->rows * ni : p->count; /* values of the first slab */
   const int64_t rest  = p->count - first;
 
@@ -146,8 +146,8 @@ static rcgns_status patch_nodes(rcgns_file *file, const rc_zone *zone, const pat
 
     RC_GOTO(done, status = read_patch(file, status, zone, p, zone->coordinate[d], at, message));
   }
-  status = place_all(file, zone, p->count, x, x + p->count, x + 2 * p->count, (p->k0 * zone->vertices[1] + p->j0) * zone->vertices[0],
-                     (double *)xyz->item + 3 * xyz->count, message);
+  status = place_all(file, zone, p->count, x, x + p->count, x + 2 * p->count,
+                     (p->k0 * zone->vertices[1] + p->j0) * zone->vertices[0], (double *)xyz->item + 3 * xyz->count, message);
   xyz->count += p->count;
   status = rc_agree(file->comm, status, message);
 done:
@@ -156,12 +156,14 @@ done:
 }
 
 /* Faces of the cells [lo, hi): those towards larger indices of every cell, and the others where no cell of ours is beyond. */
-static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int64_t base, int64_t lo, int64_t hi, int64_t first_cell)
+static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int64_t base, int64_t lo, int64_t hi,
+                        int64_t first_cell)
 {
-  static const int8_t corner[MAX_CORNERS][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-  static const int8_t axis[MAX_FACES] = {2, 1, 0, 1, 0, 2}, step[MAX_FACES] = {-1, -1, 1, 1, -1, 1}; /* of the faces of HEXA */
-  const int64_t *const n = zone->cells;
-  const int64_t stride[3] = {1, n[0], n[0] * n[1]};
+  static const int8_t  corner[MAX_CORNERS][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                                 {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+  static const int8_t  axis[MAX_FACES] = {2, 1, 0, 1, 0, 2}, step[MAX_FACES] = {-1, -1, 1, 1, -1, 1}; /* of the faces of HEXA */
+  const int64_t *const n         = zone->cells;
+  const int64_t        stride[3] = {1, n[0], n[0] * n[1]};
 
   for (int64_t c = lo; c < hi; c++) {
     const int64_t at[3] = {c % n[0], c / n[0] % n[1], c / stride[2]};
@@ -185,13 +187,15 @@ static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int6
   return true;
 }
 
-static rcgns_status build_block(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell, rcgns_message *message)
+static rcgns_status build_block(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell,
+                                rcgns_message *message)
 {
   const patch   p    = patch_of(zone, lo, hi);
   const int64_t base = file->build.xyz.count;
 
   RC_TRY(patch_nodes(file, zone, &p, message));
-  return rc_agree(file->comm, block_faces(&file->build, zone, &p, base, lo, hi, first_cell) ? RCGNS_OK : rc_no_memory(message), message);
+  return rc_agree(file->comm, block_faces(&file->build, zone, &p, base, lo, hi, first_cell) ? RCGNS_OK : rc_no_memory(message),
+                  message);
 }
 
 /* ---- nodes of elements -------------------------------------------------------------------------------------------- */
@@ -215,8 +219,8 @@ static rcgns_status read_slab(rcgns_file *file, rcgns_status mine, const rc_zone
 }
 
 /* Answer the requests: which nodes, from how many each. */
-static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t n, const double *x, const int64_t *asked,
-                           int64_t num_asked, located *reply, rcgns_message *message)
+static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t n, const double *x,
+                           const int64_t *asked, int64_t num_asked, located *reply, rcgns_message *message)
 {
   uint8_t     *times  = calloc((size_t)n + 1, 1);
   rcgns_status status = times ? RCGNS_OK : rc_no_memory(message);
@@ -233,18 +237,19 @@ static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, int64_t 
   return status;
 }
 
-rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n, double *xyz,
-                            uint8_t *shared, rcgns_message *message)
+rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n,
+                            double *xyz, uint8_t *shared, rcgns_message *message)
 {
   const int64_t total = zone->num_nodes;
   const int64_t lo = rc_share(total, file->rank, file->size), hi = rc_share(total, file->rank + 1, file->size);
   int64_t      *count = calloc(3 * (size_t)file->size, sizeof *count), *next = count ? count + file->size : NULL;
-  int64_t      *sorted = rc_alloc(n, sizeof *sorted), *place_of = rc_alloc(n, sizeof *place_of), *recv = count ? count + 2 * file->size : NULL;
-  double       *x     = rc_alloc(3 * (hi - lo), sizeof *x);
-  void         *asked = NULL, *back = NULL;
-  located      *reply = NULL;
-  int64_t       num_asked = 0;
-  rcgns_status  status = mine;
+  int64_t      *sorted = rc_alloc(n, sizeof *sorted), *place_of = rc_alloc(n, sizeof *place_of),
+          *recv      = count ? count + 2 * file->size : NULL;
+  double      *x     = rc_alloc(3 * (hi - lo), sizeof *x);
+  void        *asked = NULL, *back = NULL;
+  located     *reply     = NULL;
+  int64_t      num_asked = 0;
+  rcgns_status status    = mine;
 
   if (status == RCGNS_OK && !(count && sorted && place_of && x)) status = rc_no_memory(message);
   for (int64_t i = 0; i < n && status == RCGNS_OK; i++) count[rc_owner(total, node[i], file->size)]++;
@@ -280,12 +285,12 @@ done:
 
 /* The standard elements of this rank in one zone. */
 typedef struct elements {
-  rc_array cell;    /* int64_t: number in the zone */
-  rc_array shape;   /* int64_t: rc_shape */
-  rc_array corner;  /* int64_t [count][MAX_CORNERS] node in the zone, later in this rank's mesh; the rest is -1 */
-  rc_map   node;    /* node in the zone -> in the order they come */
-  uint8_t *shared;  /* [nodes] other ranks have it too */
-  int64_t  base;    /* index in this rank's mesh of its first node */
+  rc_array cell;   /* int64_t: number in the zone */
+  rc_array shape;  /* int64_t: rc_shape */
+  rc_array corner; /* int64_t [count][MAX_CORNERS] node in the zone, later in this rank's mesh; the rest is -1 */
+  rc_map   node;   /* node in the zone -> in the order they come */
+  uint8_t *shared; /* [nodes] other ranks have it too */
+  int64_t  base;   /* index in this rank's mesh of its first node */
 } elements;
 
 static void drop_elements(elements *e)
@@ -305,10 +310,12 @@ static rcgns_status add_element(const rcgns_file *file, const rc_zone *zone, ele
   for (int i = 0; i < MAX_CORNERS; i++) {
     corner[i] = i < rc_corners(shape) ? node[i] - 1 : -1;
     if (i < rc_corners(shape) && (node[i] < 1 || node[i] > zone->num_nodes))
-      return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: cell %lld refers to node %lld, but there are %lld: the mesh is damaged",
-                     file->path, zone->name, (long long)cell + 1, (long long)node[i], (long long)zone->num_nodes);
+      return rc_fail(message, RCGNS_GEOMETRY,
+                     "%s: zone %s: cell %lld refers to node %lld, but there are %lld: the mesh is damaged", file->path,
+                     zone->name, (long long)cell + 1, (long long)node[i], (long long)zone->num_nodes);
   }
-  if (!rc_push(&e->cell, cell) || !rc_push(&e->shape, (int64_t)shape) || !rc_reserve(&e->corner, 1, sizeof corner)) return rc_no_memory(message);
+  if (!rc_push(&e->cell, cell) || !rc_push(&e->shape, (int64_t)shape) || !rc_reserve(&e->corner, 1, sizeof corner))
+    return rc_no_memory(message);
   memcpy((int64_t *)e->corner.item + MAX_CORNERS * e->corner.count++, corner, sizeof corner);
   return RCGNS_OK;
 }
@@ -383,8 +390,8 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, elements *e, r
 /* Face f of element i: its loop without repetitions of neighbours, its sorted nodes. Returns the number of distinct nodes. */
 static int side_of(const elements *e, int64_t i, int f, int64_t *loop, int *length, int64_t key[4])
 {
-  const int64_t *corner = (const int64_t *)e->corner.item + MAX_CORNERS * i;
-  const int8_t  *face   = ELEMENT[((const int64_t *)e->shape.item)[i]].face[f];
+  const int64_t *corner   = (const int64_t *)e->corner.item + MAX_CORNERS * i;
+  const int8_t  *face     = ELEMENT[((const int64_t *)e->shape.item)[i]].face[f];
   int            distinct = 0, n = 0;
 
   for (int v = 0; v < 4 && face[v] >= 0; v++) {
@@ -419,12 +426,12 @@ static bool is_opposite(const int64_t *a, int n, const int64_t *b, int m)
 /* Faces that join by their nodes. For each set of nodes: up to two sides, MAX_FACES * element + face. */
 typedef struct joints {
   rc_map   set;
-  rc_array side; /* int64_t [sets][2], -1: none */
+  rc_array side;  /* int64_t [sets][2], -1: none */
   rc_array alone; /* int64_t: sides that fold back on their own cell */
 } joints;
 
-static rcgns_status join_side(const rcgns_file *file, const rc_zone *zone, const elements *e, joints *j, int64_t side, const int64_t key[4],
-                              rcgns_message *message)
+static rcgns_status join_side(const rcgns_file *file, const rc_zone *zone, const elements *e, joints *j, int64_t side,
+                              const int64_t key[4], rcgns_message *message)
 {
   const int64_t *cell = e->cell.item;
   const int64_t  set  = rc_map_add(&j->set, key);
@@ -434,8 +441,9 @@ static rcgns_status join_side(const rcgns_file *file, const rc_zone *zone, const
   if (set == j->side.count / 2 && !(rc_push(&j->side, -1) && rc_push(&j->side, -1))) return rc_no_memory(message);
   both = (int64_t *)j->side.item + 2 * set;
   if (both[0] >= 0 && both[1] >= 0)
-    return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: the cells %lld, %lld and %lld share one face: at most two can: repair the mesh",
-                   file->path, zone->name, (long long)cell[both[0] / MAX_FACES] + 1, (long long)cell[both[1] / MAX_FACES] + 1,
+    return rc_fail(message, RCGNS_GEOMETRY,
+                   "%s: zone %s: the cells %lld, %lld and %lld share one face: at most two can: repair the mesh", file->path,
+                   zone->name, (long long)cell[both[0] / MAX_FACES] + 1, (long long)cell[both[1] / MAX_FACES] + 1,
                    (long long)cell[side / MAX_FACES] + 1);
   both[both[0] >= 0] = side;
   return RCGNS_OK;
@@ -500,7 +508,8 @@ static bool claim_of(const elements *e, const joints *j, int64_t set, claim *c)
   const int64_t *key = (const int64_t *)j->set.key.item + 4 * set, *both = (const int64_t *)j->side.item + 2 * set;
   const int64_t *node = e->node.key.item;
 
-  *c = (claim){.key = {-1, -1, -1, -1}, .cell = ((const int64_t *)e->cell.item)[both[0] / MAX_FACES], .sides = both[1] < 0 ? 1 : 2};
+  *c = (claim){
+      .key = {-1, -1, -1, -1}, .cell = ((const int64_t *)e->cell.item)[both[0] / MAX_FACES], .sides = both[1] < 0 ? 1 : 2};
   for (int k = 0; k < 4 && key[k] >= 0; k++) {
     int at = k;
 
@@ -512,13 +521,14 @@ static bool claim_of(const elements *e, const joints *j, int64_t set, claim *c)
 }
 
 /* No face may belong to three cells, wherever they are. Collective; only faces between ranks travel. */
-static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const elements *e, const joints *j, rcgns_message *message)
+static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const elements *e, const joints *j,
+                                 rcgns_message *message)
 {
   const int64_t sets   = j->set.key.count;
   int64_t      *count  = calloc(3 * (size_t)file->size, sizeof *count);
   rcgns_status  status = count ? RCGNS_OK : rc_no_memory(message);
-  claim        *send = NULL, one;
-  void         *got  = NULL;
+  claim        *send   = NULL, one;
+  void         *got    = NULL;
   int64_t       total = 0, num = 0;
 
   for (int64_t s = 0; s < sets && count; s++)
@@ -527,7 +537,8 @@ static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const el
   for (int r = 1; r < file->size && count; r++) count[file->size + r] = count[file->size + r - 1] + count[r - 1];
   for (int64_t s = 0; s < sets && status == RCGNS_OK; s++)
     if (claim_of(e, j, s, &one)) send[count[file->size + one.key[0] % file->size]++] = one;
-  RC_GOTO(done, status = rc_exchange(file->comm, status, send, count, sizeof *send, &got, count ? count + 2 * file->size : NULL, message));
+  RC_GOTO(done, status = rc_exchange(file->comm, status, send, count, sizeof *send, &got, count ? count + 2 * file->size : NULL,
+                                     message));
   for (int r = 0; r < file->size; r++) total += count[2 * file->size + r];
   qsort(got, (size_t)total, sizeof *send, by_key);
   for (int64_t i = 0, first = 0, sides = 0; i < total && status == RCGNS_OK; i++) {
@@ -536,10 +547,12 @@ static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const el
     if (memcmp(c->key, ((const claim *)got)[first].key, sizeof c->key)) first = i, sides = 0;
     sides += c->sides;
     if (sides > 2)
-      status = rc_fail(message, RCGNS_GEOMETRY,
-                       "%s: zone %s: more than two cells, %lld and %lld among them, share the face with the nodes %lld %lld %lld: "
-                       "repair the mesh", file->path, zone->name, (long long)((const claim *)got)[first].cell + 1, (long long)c->cell + 1,
-                       (long long)c->key[0] + 1, (long long)c->key[1] + 1, (long long)c->key[2] + 1);
+      status =
+          rc_fail(message, RCGNS_GEOMETRY,
+                  "%s: zone %s: more than two cells, %lld and %lld among them, share the face with the nodes %lld %lld %lld: "
+                  "repair the mesh",
+                  file->path, zone->name, (long long)((const claim *)got)[first].cell + 1, (long long)c->cell + 1,
+                  (long long)c->key[0] + 1, (long long)c->key[1] + 1, (long long)c->key[2] + 1);
   }
   status = rc_agree(file->comm, status, message);
 done:
@@ -549,7 +562,8 @@ done:
   return status;
 }
 
-static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elements *e, int64_t lo, int64_t first_cell, rcgns_message *message)
+static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elements *e, int64_t lo, int64_t first_cell,
+                                   rcgns_message *message)
 {
   joints       j      = {.alone = {.item = NULL}};
   rcgns_status status = locate(file, zone, e, message);
@@ -559,9 +573,10 @@ static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elemen
     if (status == RCGNS_OK) status = check_shared(file, zone, e, &j, message);
     if (status == RCGNS_OK) {
       const int64_t *side = j.side.item, *alone = j.alone.item;
-      bool           ok   = true;
+      bool           ok = true;
 
-      for (int64_t s = 0; s < j.set.key.count && ok; s++) ok = emit(&file->build, e, first_cell, lo, side[2 * s], side[2 * s + 1]);
+      for (int64_t s = 0; s < j.set.key.count && ok; s++)
+        ok = emit(&file->build, e, first_cell, lo, side[2 * s], side[2 * s + 1]);
       for (int64_t s = 0; s < j.alone.count && ok; s++) ok = emit(&file->build, e, first_cell, lo, alone[s], -1);
       status = rc_agree(file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
     }
@@ -573,7 +588,8 @@ static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elemen
 }
 
 /* Cells [lo, hi) of an unstructured zone. Collective. */
-static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell, rcgns_message *message)
+static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell,
+                                   rcgns_message *message)
 {
   elements     e      = {.base = 0};
   bool         any    = false;
@@ -585,14 +601,16 @@ static rcgns_status build_sections(rcgns_file *file, const rc_zone *zone, int64_
     const int64_t     a = rc_clamp(lo - s->first_cell, 0, s->num_cells), b = rc_clamp(hi - s->first_cell, a, s->num_cells);
 
     if (s->is_poly) continue;
-    any    = true;
-    status = s->layout == RC_MIXED ? read_mixed(file, zone, s, a, b, &e, message) : read_fixed(file, zone, s, a, b, &e, message);
+    any = true;
+    status =
+        s->layout == RC_MIXED ? read_mixed(file, zone, s, a, b, &e, message) : read_fixed(file, zone, s, a, b, &e, message);
   }
   if (status == RCGNS_OK && any) status = build_elements(file, zone, &e, lo, first_cell, message);
   drop_elements(&e);
   for (int64_t i = 0; i < zone->num_sections && status == RCGNS_OK; i++) {
     const rc_section *s = zone->section + i;
-    const int64_t     a = rc_clamp(lo, s->first_cell, s->first_cell + s->num_cells), b = rc_clamp(hi, a, s->first_cell + s->num_cells);
+    const int64_t     a = rc_clamp(lo, s->first_cell, s->first_cell + s->num_cells),
+                  b     = rc_clamp(hi, a, s->first_cell + s->num_cells);
 
     if (s->is_poly) status = rc_poly_build(file, zone, s, a, b, first_cell + a - lo, message);
   }
@@ -616,8 +634,8 @@ static rcgns_status orient_zones(rcgns_file *file, const int64_t *first_face, rc
       if (neighbour[f] < 0)
         volume[z] += rc_cone(xyz, node + offset[f], offset[f + 1] - offset[f], xyz + 3 * node[offset[first_face[z]]]);
   for (int64_t z = 0; z < file->num_zones; z += 1 << 20)
-    MPI_Allreduce(MPI_IN_PLACE, volume + z, (int)(file->num_zones - z < 1 << 20 ? file->num_zones - z : 1 << 20), MPI_DOUBLE, MPI_SUM,
-                  file->comm);
+    MPI_Allreduce(MPI_IN_PLACE, volume + z, (int)(file->num_zones - z < 1 << 20 ? file->num_zones - z : 1 << 20), MPI_DOUBLE,
+                  MPI_SUM, file->comm);
   for (int64_t z = 0; z < file->num_zones; z++)
     for (int64_t f = first_face[z]; f < first_face[z + 1] && volume[z] < 0.0; f++)
       for (int64_t a = offset[f], b = offset[f + 1] - 1; a < b; a++, b--) {
@@ -635,13 +653,15 @@ static rcgns_status build_zone(rcgns_file *file, int64_t z, rcgns_message *messa
   const rc_zone *zone  = file->zone + z;
   rc_array      *cells = &file->build.cell_global;
   const int64_t  first = cells->count;
-  const int64_t  lo = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells), hi = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
-  rcgns_status   status = RCGNS_OK;
+  const int64_t  lo    = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells),
+                hi     = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
+  rcgns_status status  = RCGNS_OK;
 
   for (int64_t c = lo; c < hi && status == RCGNS_OK; c++)
     if (!rc_push(cells, zone->first_cell + c)) status = rc_no_memory(message);
   RC_TRY(rc_agree(file->comm, status, message));
-  return zone->is_structured ? build_block(file, zone, lo, hi, first, message) : build_sections(file, zone, lo, hi, first, message);
+  return zone->is_structured ? build_block(file, zone, lo, hi, first, message)
+                             : build_sections(file, zone, lo, hi, first, message);
 }
 
 rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message)

@@ -12,12 +12,12 @@
 /* The polyhedra of this rank in one section. */
 typedef struct polys {
   int64_t  num_cells;
-  int64_t  number;     /* in the zone, of the first cell */
-  rc_array offset;     /* [num_cells + 1] */
-  rc_array face;       /* face of the zone, later of `faces` below */
-  rc_array sign;       /* 1: its normal points out of the cell; -1: into it; 0: listed twice, bounds nothing */
-  rc_map   faces;      /* face of the zone -> local face */
-  rc_array ref;        /* [local faces][2] where in `face` the cells that have it list it, -1 */
+  int64_t  number;        /* in the zone, of the first cell */
+  rc_array offset;        /* [num_cells + 1] */
+  rc_array face;          /* face of the zone, later of `faces` below */
+  rc_array sign;          /* 1: its normal points out of the cell; -1: into it; 0: listed twice, bounds nothing */
+  rc_map   faces;         /* face of the zone -> local face */
+  rc_array ref;           /* [local faces][2] where in `face` the cells that have it list it, -1 */
   rc_array loop_at, loop; /* [local faces + 1], nodes: of the zone, later of this rank's mesh */
 } polys;
 
@@ -85,7 +85,8 @@ typedef struct side {
 } side;
 
 /* This rank's share of the parents of one NGON_n section, appended to sides. Collective. */
-static rcgns_status read_parents(rcgns_file *file, const rc_zone *zone, const rc_section *s, rc_array *sides, rcgns_message *message)
+static rcgns_status read_parents(rcgns_file *file, const rc_zone *zone, const rc_section *s, rc_array *sides,
+                                 rcgns_message *message)
 {
   const int64_t n  = s->num_rows;
   const int64_t lo = rc_share(n, file->rank, file->size), hi = rc_share(n, file->rank + 1, file->size), num = hi - lo;
@@ -100,8 +101,9 @@ static rcgns_status read_parents(rcgns_file *file, const rc_zone *zone, const rc
 
     if (!parent[i]) continue;
     if (cell < 0 || cell >= zone->num_cells)
-      status = rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld, which is not among its %lld cells",
-                       file->path, zone->name, (long long)parent[i], (long long)zone->num_cells);
+      status =
+          rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld, which is not among its %lld cells",
+                  file->path, zone->name, (long long)parent[i], (long long)zone->num_cells);
     else
       ((side *)sides->item)[sides->count++] = (side){cell, s->first_cell + lo + i % num, i < num ? 1 : -1};
   }
@@ -121,10 +123,11 @@ static int by_cell_face(const void *a, const void *b)
 }
 
 /* Faces of the cells [lo, hi) from ParentElements. Collective. */
-static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, polys *p, rcgns_message *message)
+static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, polys *p,
+                                    rcgns_message *message)
 {
-  rc_array     sides  = {.item = NULL};
-  int64_t     *count  = calloc(2 * (size_t)file->size, sizeof *count), total = 0;
+  rc_array     sides = {.item = NULL};
+  int64_t     *count = calloc(2 * (size_t)file->size, sizeof *count), total = 0;
   void        *got    = NULL;
   rcgns_status status = RCGNS_OK;
 
@@ -135,7 +138,8 @@ static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64
   for (int64_t i = 0; i < sides.count && count; i++)
     count[rc_owner(file->num_cells, zone->first_cell + ((side *)sides.item)[i].cell, file->size)]++;
   status = count ? RCGNS_OK : rc_no_memory(message);
-  RC_GOTO(done, status = rc_exchange(file->comm, status, sides.item, count, sizeof(side), &got, count ? count + file->size : NULL, message));
+  RC_GOTO(done, status = rc_exchange(file->comm, status, sides.item, count, sizeof(side), &got,
+                                     count ? count + file->size : NULL, message));
   for (int r = 0; r < file->size; r++) total += count[file->size + r];
   qsort(got, (size_t)total, sizeof(side), by_cell_face);
   if (!rc_reserve(&p->face, total, sizeof(int64_t)) || !rc_reserve(&p->sign, total, sizeof(int64_t)) ||
@@ -171,20 +175,21 @@ static rcgns_status number_faces(const rcgns_file *file, const rc_zone *zone, po
       return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: cell %lld has %lld faces: it is not closed", file->path, zone->name,
                      (long long)(p->number + c + 1), (long long)(offset[c + 1] - offset[c]));
     for (int64_t i = offset[c]; i < offset[c + 1]; i++) {
-      int64_t *face = ints_of(&p->face) + i, *ref;
-      const int64_t f = rc_map_add(&p->faces, face);
+      int64_t      *face = ints_of(&p->face) + i, *ref;
+      const int64_t f    = rc_map_add(&p->faces, face);
 
       if (f < 0 || (2 * f == p->ref.count && !(rc_push(&p->ref, -1) && rc_push(&p->ref, -1)))) return rc_no_memory(message);
       ref   = ints_of(&p->ref) + 2 * f;
       *face = f;
       if (ref[ref[1] >= 0] >= offset[c]) {
         sign[i] = sign[ref[ref[1] >= 0]] = 0;
-        ref[ref[1] >= 0] = -1;
+        ref[ref[1] >= 0]                 = -1;
         continue;
       }
       if (ref[1] >= 0)
-        return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: cell %lld is the third of face %lld: a face has at most two cells",
-                       file->path, zone->name, (long long)(p->number + c + 1), (long long)number_of(zone, ints_of(&p->faces.key)[f]));
+        return rc_fail(message, RCGNS_GEOMETRY,
+                       "%s: zone %s: cell %lld is the third of face %lld: a face has at most two cells", file->path, zone->name,
+                       (long long)(p->number + c + 1), (long long)number_of(zone, ints_of(&p->faces.key)[f]));
       ref[ref[0] >= 0] = i;
     }
   }
@@ -205,10 +210,10 @@ static rcgns_status read_faces(rcgns_file *file, const rc_zone *zone, slab *s, r
   rcgns_status status = RCGNS_OK;
 
   for (int64_t k = 0; k < zone->num_face_sections && status == RCGNS_OK; k++) {
-    const rc_section *f    = zone->face + k;
-    const int64_t     lo   = rc_clamp(s->lo - f->first_cell, 0, f->num_rows), hi = rc_clamp(s->hi - f->first_cell, lo, f->num_rows);
-    const int64_t     base = s->node.count;
-    bool              ok;
+    const rc_section *f = zone->face + k;
+    const int64_t lo = rc_clamp(s->lo - f->first_cell, 0, f->num_rows), hi = rc_clamp(s->hi - f->first_cell, lo, f->num_rows);
+    const int64_t base = s->node.count;
+    bool          ok;
 
     RC_GOTO(done, status = rc_rows_read(file, zone, f, lo, hi, &offset, &data, message));
     ok = rc_reserve(&s->node, data.count, sizeof(int64_t));
@@ -229,10 +234,10 @@ typedef struct request {
 } request;
 
 /* The lengths and nodes that answer the requests; nodes count from 0. */
-static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const slab *s, const request *asked, int64_t num, rc_array *length,
-                           rc_array *node, rcgns_message *message)
+static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const slab *s, const request *asked, int64_t num,
+                           rc_array *length, rc_array *node, rcgns_message *message)
 {
-  int64_t     *first  = calloc(2 * (size_t)(s->hi - s->lo) + 1, sizeof *first), *refs = first + (s->hi - s->lo);
+  int64_t     *first = calloc(2 * (size_t)(s->hi - s->lo) + 1, sizeof *first), *refs = first + (s->hi - s->lo);
   rcgns_status status = first ? RCGNS_OK : rc_no_memory(message);
 
   for (int64_t i = 0; i < num && status == RCGNS_OK; i++) {
@@ -241,17 +246,19 @@ static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const sl
     if (!refs[f]) first[f] = asked[i].cell;
     refs[f] += asked[i].refs;
     if (refs[f] > 2)
-      status = rc_fail(message, RCGNS_GEOMETRY,
-                       "%s: zone %s: more than two cells, %lld and %lld among them, have face %lld: repair the mesh", file->path,
-                       zone->name, (long long)first[f] + 1, (long long)asked[i].cell + 1, (long long)number_of(zone, asked[i].face));
+      status =
+          rc_fail(message, RCGNS_GEOMETRY,
+                  "%s: zone %s: more than two cells, %lld and %lld among them, have face %lld: repair the mesh", file->path,
+                  zone->name, (long long)first[f] + 1, (long long)asked[i].cell + 1, (long long)number_of(zone, asked[i].face));
     else if (!rc_push(length, n) || !rc_reserve(node, n, sizeof(int64_t)))
       status = rc_no_memory(message);
     for (int64_t v = 0; v < n && status == RCGNS_OK; v++) {
       const int64_t mine = ints_of(&s->node)[at + v];
 
       if (mine < 1 || mine > zone->num_nodes)
-        status = rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: face %lld refers to node %lld, but there are %lld: the mesh is damaged",
-                         file->path, zone->name, (long long)number_of(zone, asked[i].face), (long long)mine, (long long)zone->num_nodes);
+        status = rc_fail(message, RCGNS_GEOMETRY,
+                         "%s: zone %s: face %lld refers to node %lld, but there are %lld: the mesh is damaged", file->path,
+                         zone->name, (long long)number_of(zone, asked[i].face), (long long)mine, (long long)zone->num_nodes);
       else
         ints_of(node)[node->count++] = mine - 1;
     }
@@ -261,8 +268,8 @@ static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const sl
 }
 
 /* Requests, sorted by the rank that reads the face; place[f] is where local face f stands. */
-static void make_requests(const rcgns_file *file, const rc_zone *zone, const polys *p, int64_t *count, int64_t *next, request *send,
-                          int64_t *place)
+static void make_requests(const rcgns_file *file, const rc_zone *zone, const polys *p, int64_t *count, int64_t *next,
+                          request *send, int64_t *place)
 {
   const int64_t *face = p->faces.key.item, *ref = p->ref.item, *offset = p->offset.item;
 
@@ -289,9 +296,10 @@ static void sum_runs(int size, const int64_t *recv, const int64_t *length, int64
 /* The loops of the faces, as nodes of the zone. Collective. */
 static rcgns_status fetch_loops(rcgns_file *file, const rc_zone *zone, polys *p, rcgns_message *message)
 {
-  const int64_t num    = p->faces.key.count;
-  slab          s      = {.lo = rc_share(zone->num_faces, file->rank, file->size), .hi = rc_share(zone->num_faces, file->rank + 1, file->size)};
-  int64_t      *count  = calloc(5 * (size_t)file->size, sizeof *count), *place = rc_alloc(num, sizeof *place), *start = NULL;
+  const int64_t num   = p->faces.key.count;
+  slab          s     = {.lo = rc_share(zone->num_faces, file->rank, file->size),
+                         .hi = rc_share(zone->num_faces, file->rank + 1, file->size)};
+  int64_t      *count = calloc(5 * (size_t)file->size, sizeof *count), *place = rc_alloc(num, sizeof *place), *start = NULL;
   request      *send   = rc_alloc(num, sizeof *send);
   rc_array      length = {.item = NULL}, node = {.item = NULL};
   void         *asked = NULL, *lengths = NULL, *nodes = NULL;
@@ -360,7 +368,8 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, polys *p, rcgn
     loop[i] = xyz->count + local;
   }
   if (status == RCGNS_OK && !rc_reserve(xyz, nodes.key.count, 3 * sizeof(double))) status = rc_no_memory(message);
-  status = rc_nodes_fetch(file, status, zone, nodes.key.item, nodes.key.count, (double *)xyz->item + 3 * xyz->count, NULL, message);
+  status =
+      rc_nodes_fetch(file, status, zone, nodes.key.item, nodes.key.count, (double *)xyz->item + 3 * xyz->count, NULL, message);
   if (status == RCGNS_OK) xyz->count += nodes.key.count;
   rc_map_drop(&nodes);
   return status;
@@ -453,8 +462,8 @@ static int64_t root_of(forest *t, int64_t i, int64_t *same)
 static bool spread_signs(const polys *p, int64_t c, const rc_array *edges, forest *t, int64_t *trial)
 {
   const int64_t begin = ints_of(&p->offset)[c], end = ints_of(&p->offset)[c + 1];
-  const edge   *e     = edges->item;
-  int64_t       root  = -1, a, b;
+  const edge   *e    = edges->item;
+  int64_t       root = -1, a, b;
 
   for (int64_t i = begin; i < end; i++) t->parent[i] = i, t->same[i] = 1;
   for (int64_t i = 0, k; i < edges->count; i = k) {
@@ -478,7 +487,7 @@ static bool spread_signs(const polys *p, int64_t c, const rc_array *edges, fores
 static double volume_of(const rcgns_file *file, const polys *p, int64_t c, const int64_t *sign, const double *origin)
 {
   const int64_t *loop = p->loop.item, *at = p->loop_at.item;
-  double         sum  = 0.0;
+  double         sum = 0.0;
 
   for (int64_t i = ints_of(&p->offset)[c]; i < ints_of(&p->offset)[c + 1]; i++) {
     const int64_t f = ints_of(&p->face)[i];
@@ -492,7 +501,7 @@ static double volume_of(const rcgns_file *file, const polys *p, int64_t c, const
  * remap_build, which knows coordinates. */
 static rcgns_status repair_signs(const rcgns_file *file, polys *p, bool *repaired, rcgns_message *message)
 {
-  int64_t     *sign   = p->sign.item, *space = rc_alloc(3 * p->sign.count, sizeof *space), *trial = space;
+  int64_t     *sign = p->sign.item, *space = rc_alloc(3 * p->sign.count, sizeof *space), *trial = space;
   forest       tree   = {space + p->sign.count, space + 2 * p->sign.count};
   rc_array     edges  = {.item = NULL};
   rcgns_status status = space ? RCGNS_OK : rc_no_memory(message);
@@ -502,7 +511,8 @@ static rcgns_status repair_signs(const rcgns_file *file, polys *p, bool *repaire
     double        volume;
 
     if (!edges_of(p, c, &edges)) status = rc_no_memory(message);
-    if (status != RCGNS_OK || is_closed(&edges, sign) || !spread_signs(p, c, &edges, &tree, trial) || !is_closed(&edges, trial)) continue;
+    if (status != RCGNS_OK || is_closed(&edges, sign) || !spread_signs(p, c, &edges, &tree, trial) || !is_closed(&edges, trial))
+      continue;
     volume = volume_of(file, p, c, trial, (const double *)file->build.xyz.item + 3 * ((const edge *)edges.item)->lo);
     for (int64_t i = begin; i < end; i++) sign[i] = volume < 0.0 ? -trial[i] : trial[i];
     *repaired = true;
@@ -546,10 +556,10 @@ static int64_t distinct(const int64_t *loop, int64_t n)
 static bool emit(rc_mesh *mesh, const polys *p, int64_t first_cell)
 {
   const int64_t *sign = p->sign.item, *ref = p->ref.item;
-  bool           ok   = true;
+  bool           ok = true;
 
   for (int64_t f = 0; f < p->faces.key.count && ok; f++) {
-    const int64_t  n = ints_of(&p->loop_at)[f + 1] - ints_of(&p->loop_at)[f];
+    const int64_t  n    = ints_of(&p->loop_at)[f + 1] - ints_of(&p->loop_at)[f];
     const int64_t *loop = ints_of(&p->loop) + ints_of(&p->loop_at)[f];
     const int64_t  a = ref[2 * f], b = ref[2 * f + 1];
 
@@ -566,8 +576,8 @@ static bool emit(rc_mesh *mesh, const polys *p, int64_t first_cell)
 
 static rcgns_status build(rcgns_file *file, const rc_zone *zone, polys *p, int64_t first_cell, rcgns_message *message)
 {
-  bool    repaired = false;
-  int64_t any;
+  bool         repaired = false;
+  int64_t      any;
   rcgns_status status;
 
   RC_TRY(rc_agree(file->comm, number_faces(file, zone, p, message), message));
@@ -578,12 +588,13 @@ static rcgns_status build(rcgns_file *file, const rc_zone *zone, polys *p, int64
   RC_TRY(rc_agree(file->comm, status, message));
   any = repaired;
   MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT64_T, MPI_MAX, file->comm);
-  if (any) RC_TRY(rc_note(file, message, "signs of faces in NFACE_n that do not close their cell were replaced by ones that do"));
+  if (any)
+    RC_TRY(rc_note(file, message, "signs of faces in NFACE_n that do not close their cell were replaced by ones that do"));
   return RCGNS_OK;
 }
 
-rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi, int64_t first_cell,
-                           rcgns_message *message)
+rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
+                           int64_t first_cell, rcgns_message *message)
 {
   polys        p = {.num_cells = hi - lo, .number = lo};
   rcgns_status status;

@@ -23,8 +23,8 @@ static int64_t add_entry(rc_plan *plan, const rc_entry *entry)
   return plan->entry.count++;
 }
 
-int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char *label, const char *type, int nd, const int64_t *dim,
-                    char kind, const void *literal)
+int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char *label, const char *type, int nd,
+                    const int64_t *dim, char kind, const void *literal)
 {
   rc_entry e = {.parent = parent, .kind = kind, .literal = literal};
 
@@ -53,8 +53,8 @@ typedef struct change {
   const char            *solution;
   int64_t                num_fields;
   const rcgns_new_field *fields;
-  int64_t               *zone_of;  /* [nodes of the tree] zone that is read, -1 */
-  bool                  *touched;  /* [nodes] it or something below it changes */
+  int64_t               *zone_of; /* [nodes of the tree] zone that is read, -1 */
+  bool                  *touched; /* [nodes] it or something below it changes */
   rcgns_message         *message;
 } change;
 
@@ -90,8 +90,8 @@ static rcgns_status copy_link(change *c, int64_t node, int64_t parent)
   const rc_node *n      = rc_node_at(tree, node);
   const int      from   = rc_node_at(tree, n->parent)->file;
   const char    *holder = rc_text(tree, rc_source_at(tree, from)->path), *file = rc_text(tree, n->link_file);
-  const char    *name   = strrchr(holder, '/');
-  rc_entry       e      = {.parent = parent, .content = RC_LINK};
+  const char    *name = strrchr(holder, '/');
+  rc_entry       e    = {.parent = parent, .content = RC_LINK};
 
   memcpy(e.name, n->name, sizeof e.name);
   memcpy(e.label, n->label, sizeof e.label);
@@ -109,8 +109,9 @@ static rcgns_status copy_payload(change *c, int64_t node, int64_t parent, int64_
   const rc_node *n = rc_node_at(&c->file->tree, node);
   rc_entry       e = {.parent = parent, .node = node, .kind = n->kind, .nd = n->nd};
 
-  if (n->kind == '?' || n->kind == 'X')
-    return rc_fail(c->message, RCGNS_IO, "%s: node %s holds values of a type (%s) that cannot be copied", c->file->path, n->name, n->type);
+  if (n->kind == '?')
+    return rc_fail(c->message, RCGNS_IO, "%s: node %s holds values of a type (%s) that cannot be copied", c->file->path,
+                   n->name, n->type);
   memcpy(e.name, n->name, sizeof e.name);
   memcpy(e.label, n->label, sizeof e.label);
   memcpy(e.type, n->type, sizeof e.type);
@@ -133,7 +134,7 @@ static rcgns_status copy_children(change *c, int64_t node, int64_t parent)
 static rcgns_status add_values(change *c, int64_t zone, int64_t field, int64_t parent, int64_t *at)
 {
   const rc_zone *z = c->file->zone + zone;
-  rc_entry       e = {.parent = parent, .label = "DataArray_t", .type = "R8", .content = RC_VALUES, .zone = zone, .field = field};
+  rc_entry e = {.parent = parent, .label = "DataArray_t", .type = "R8", .content = RC_VALUES, .zone = zone, .field = field};
 
   snprintf(e.name, sizeof e.name, "%s", c->fields[field].name);
   e.nd     = z->is_structured ? 3 : 1;
@@ -148,7 +149,9 @@ static rcgns_status add_location(change *c, int64_t parent)
   static const char    text[] = "CellCenter";
   static const int64_t size   = sizeof text - 1;
 
-  return rc_plan_add(c->plan, parent, "GridLocation", "GridLocation_t", "C1", 1, &size, 'C', text) < 0 ? rc_no_memory(c->message) : RCGNS_OK;
+  return rc_plan_add(c->plan, parent, "GridLocation", "GridLocation_t", "C1", 1, &size, 'C', text) < 0
+             ? rc_no_memory(c->message)
+             : RCGNS_OK;
 }
 
 /* An array that stays in a solution whose rind is taken away. */
@@ -195,8 +198,8 @@ static rcgns_status change_solution(change *c, int64_t zone, int64_t node, int64
   rcgns_status   status  = written ? RCGNS_OK : rc_no_memory(c->message);
 
   if (status == RCGNS_OK && !rc_rind(tree, node, nd, rind))
-    status = rc_fail(c->message, RCGNS_IO, "%s: zone %s: the Rind of solution %s is malformed", c->file->path, c->file->zone[zone].name,
-                     c->solution);
+    status = rc_fail(c->message, RCGNS_IO, "%s: zone %s: the Rind of solution %s is malformed", c->file->path,
+                     c->file->zone[zone].name, c->solution);
   if (status == RCGNS_OK) status = copy_payload(c, node, parent, &at);
   for (int64_t i = -1; status == RCGNS_OK && (i = rc_tree_find(tree, node, i, NULL, NULL)) >= 0;) {
     const rc_node *n = rc_node_at(tree, i);
@@ -241,7 +244,8 @@ static rcgns_status copy_node(change *c, int64_t node, int64_t parent)
   const int64_t  zone = c->zone_of[node];
   int64_t        at, solution;
 
-  if (n->is_link && (n->is_dead || (!c->touched[node] && !rc_source_at(tree, n->file)->is_adf))) return copy_link(c, node, parent);
+  if (n->is_link && (n->is_dead || (!c->touched[node] && !rc_source_at(tree, n->file)->is_adf)))
+    return copy_link(c, node, parent);
   RC_TRY(copy_payload(c, node, parent, &at));
   if (zone < 0) return copy_children(c, node, at);
   solution = find_solution(c, zone);
@@ -253,8 +257,8 @@ static rcgns_status copy_node(change *c, int64_t node, int64_t parent)
 /* May the node of that name take CellCenter fields? */
 static rcgns_status check_solution(const change *c, int64_t zone)
 {
-  const rc_tree *tree = &c->file->tree;
-  const int64_t  node = find_solution(c, zone);
+  const rc_tree *tree  = &c->file->tree;
+  const int64_t  node  = find_solution(c, zone);
   const char    *where = c->file->zone[zone].name;
   char           location[RC_NAME];
   bool           empty = true;
@@ -264,12 +268,15 @@ static rcgns_status check_solution(const change *c, int64_t zone)
     return rc_fail(c->message, RCGNS_USAGE, "%s: zone %s: its node %s is no solution: choose another name (--output-solution)",
                    c->file->path, where, c->solution);
   rc_tree_string(tree, rc_tree_find(tree, node, -1, "GridLocation_t", NULL), location, sizeof location);
-  for (int64_t i = -1; (i = rc_tree_find(tree, node, i, "DataArray_t", NULL)) >= 0;) empty = empty && !rc_node_at(tree, i)->kind;
+  for (int64_t i = -1; (i = rc_tree_find(tree, node, i, "DataArray_t", NULL)) >= 0;)
+    empty = empty && !rc_node_at(tree, i)->kind;
   if ((*location || !empty) && strcmp(location, "CellCenter"))
-    return rc_fail(c->message, RCGNS_USAGE, "%s: zone %s: its solution %s is %s-located: choose another name (--output-solution)",
-                   c->file->path, where, c->solution, *location ? location : "Vertex");
+    return rc_fail(c->message, RCGNS_USAGE,
+                   "%s: zone %s: its solution %s is %s-located: choose another name (--output-solution)", c->file->path, where,
+                   c->solution, *location ? location : "Vertex");
   if (rc_tree_find(tree, node, -1, NULL, "PointList") >= 0 || rc_tree_find(tree, node, -1, NULL, "PointRange") >= 0)
-    return rc_fail(c->message, RCGNS_USAGE, "%s: zone %s: its solution %s covers a part of the zone: choose another name (--output-solution)",
+    return rc_fail(c->message, RCGNS_USAGE,
+                   "%s: zone %s: its solution %s covers a part of the zone: choose another name (--output-solution)",
                    c->file->path, where, c->solution);
   return RCGNS_OK;
 }
@@ -284,12 +291,15 @@ static bool is_name(const char *name)
 static rcgns_status check_names(const change *c)
 {
   if (!is_name(c->solution))
-    return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a solution: 1 to 32 characters without /", c->solution ? c->solution : "");
+    return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a solution: 1 to 32 characters without /",
+                   c->solution ? c->solution : "");
   for (int64_t f = 0; f < c->num_fields; f++) {
     if (!is_name(c->fields[f].name))
-      return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a field: 1 to 32 characters without /", c->fields[f].name);
+      return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a field: 1 to 32 characters without /",
+                     c->fields[f].name);
     for (int64_t g = 0; g < f; g++)
-      if (!strcmp(c->fields[f].name, c->fields[g].name)) return rc_fail(c->message, RCGNS_USAGE, "field %s is given twice", c->fields[f].name);
+      if (!strcmp(c->fields[f].name, c->fields[g].name))
+        return rc_fail(c->message, RCGNS_USAGE, "field %s is given twice", c->fields[f].name);
   }
   for (int64_t z = 0; z < c->file->num_zones; z++) RC_TRY(check_solution(c, z));
   return RCGNS_OK;
@@ -331,7 +341,8 @@ static rcgns_status check_path(const rcgns_file *file, const char *path, rcgns_m
 
   if (!folder) return rc_no_memory(message);
   if (!stat(path, &st)) {
-    if (!S_ISREG(st.st_mode)) status = rc_fail(message, RCGNS_IO, "%s: it exists and is not a regular file: choose another output", path);
+    if (!S_ISREG(st.st_mode))
+      status = rc_fail(message, RCGNS_IO, "%s: it exists and is not a regular file: choose another output", path);
     for (int64_t i = 0; i < file->tree.source.count && status == RCGNS_OK; i++) {
       const rc_source *source = rc_source_at(&file->tree, i);
 
@@ -394,7 +405,8 @@ static rcgns_status begin(const rc_plan *plan, const char *path, char *part, siz
   return rc_h5_skeleton(part, plan, &why) == RCGNS_OK ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: %.900s", path, why.text);
 }
 
-static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields, rcgns_message *message)
+static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields,
+                               rcgns_message *message)
 {
   char          part[PATH_MAX] = "";
   rcgns_message why            = {""};
@@ -411,11 +423,12 @@ static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char
   return status;
 }
 
-rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solution, int64_t num_fields, const rcgns_new_field *fields,
-                         rcgns_message *message)
+rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solution, int64_t num_fields,
+                         const rcgns_new_field *fields, rcgns_message *message)
 {
-  rc_plan      plan = {.entry = {.item = NULL}};
-  change       c    = {.file = file, .plan = &plan, .solution = solution, .num_fields = num_fields, .fields = fields, .message = message};
+  rc_plan plan = {.entry = {.item = NULL}};
+  change  c    = {
+          .file = file, .plan = &plan, .solution = solution, .num_fields = num_fields, .fields = fields, .message = message};
   rcgns_status status;
 
   status = rcgns_check_output(file, path, message);
@@ -448,8 +461,8 @@ static void *own(draft *d, int64_t count, size_t size)
   return item;
 }
 
-static int64_t put(draft *d, int64_t parent, const char *name, const char *label, const char *type, int nd, const int64_t *dim, char kind,
-                   const void *values)
+static int64_t put(draft *d, int64_t parent, const char *name, const char *label, const char *type, int nd, const int64_t *dim,
+                   char kind, const void *values)
 {
   const int64_t at = d->ok ? rc_plan_add(&d->plan, parent, name, label, type, nd, dim, kind, values) : -1;
 
@@ -458,7 +471,8 @@ static int64_t put(draft *d, int64_t parent, const char *name, const char *label
 }
 
 /* Integers, as I4 where they fit. */
-static int64_t put_ints(draft *d, int64_t parent, const char *name, const char *label, int nd, const int64_t *dim, const int64_t *values)
+static int64_t put_ints(draft *d, int64_t parent, const char *name, const char *label, int nd, const int64_t *dim,
+                        const int64_t *values)
 {
   int64_t count = 1;
   bool    small = true;
@@ -488,8 +502,8 @@ static void put_coordinates(draft *d, int64_t zone, const double *xyz, int64_t n
   }
 }
 
-static void put_elements(draft *d, int64_t zone, const char *name, int64_t code, int64_t first, int64_t n, const int64_t *connectivity,
-                         const int64_t *offset)
+static void put_elements(draft *d, int64_t zone, const char *name, int64_t code, int64_t first, int64_t n,
+                         const int64_t *connectivity, const int64_t *offset)
 {
   const int64_t two = 2, rows = n + 1, length = offset[n];
   int64_t      *head = own(d, 4, sizeof *head);
@@ -507,7 +521,8 @@ static void put_elements(draft *d, int64_t zone, const char *name, int64_t code,
 static void put_polyhedra(draft *d, int64_t zone, const remap_mesh *mesh)
 {
   const int64_t n = mesh->num_faces, cells = mesh->num_cells, length = mesh->face_offset[n];
-  int64_t      *node = own(d, length, sizeof *node), *offset = own(d, cells + 1, sizeof *offset), *face = own(d, 2 * n, sizeof *face);
+  int64_t      *node = own(d, length, sizeof *node), *offset = own(d, cells + 1, sizeof *offset),
+          *face = own(d, 2 * n, sizeof *face);
 
   if (!node || !offset || !face) return;
   for (int64_t i = 0; i < length; i++) node[i] = mesh->face_node[i] + 1;
@@ -529,19 +544,19 @@ static void put_polyhedra(draft *d, int64_t zone, const remap_mesh *mesh)
 
 static void put_zone(draft *d, int64_t base, const rcgns_new_zone *z, const char *solution)
 {
-  const bool    block = z->mesh == NULL;
-  const int     nd    = block ? 3 : 1;
+  const bool    block    = z->mesh == NULL;
+  const int     nd       = block ? 3 : 1;
   const int64_t shape[2] = {3, nd};
   int64_t      *size = own(d, 9, sizeof *size), dim[3], cell[3], nodes = 1, zone, at;
 
   if (!size) return;
   memset(size, 0, 9 * sizeof *size);
   for (int k = 0; k < nd; k++) {
-    size[k]           = block ? z->num_vertices[k] : z->mesh->num_nodes;
-    size[nd + k]      = block ? z->num_vertices[k] - 1 : z->mesh->num_cells;
-    dim[nd - 1 - k]   = size[k];
-    cell[nd - 1 - k]  = size[nd + k];
-    nodes            *= size[k];
+    size[k]          = block ? z->num_vertices[k] : z->mesh->num_nodes;
+    size[nd + k]     = block ? z->num_vertices[k] - 1 : z->mesh->num_cells;
+    dim[nd - 1 - k]  = size[k];
+    cell[nd - 1 - k] = size[nd + k];
+    nodes *= size[k];
   }
   zone = put_ints(d, base, z->name, "Zone_t", 2, shape, size);
   put_text(d, zone, "ZoneType", "ZoneType_t", block ? "Structured" : "Unstructured");
@@ -550,28 +565,32 @@ static void put_zone(draft *d, int64_t base, const rcgns_new_zone *z, const char
   if (!z->num_fields) return;
   at = put(d, zone, solution, "FlowSolution_t", NULL, 0, NULL, 0, NULL);
   put_text(d, at, "GridLocation", "GridLocation_t", "CellCenter");
-  for (int64_t f = 0; f < z->num_fields; f++) put(d, at, z->field[f].name, "DataArray_t", "R8", nd, cell, 'R', z->field[f].values);
+  for (int64_t f = 0; f < z->num_fields; f++)
+    put(d, at, z->field[f].name, "DataArray_t", "R8", nd, cell, 'R', z->field[f].values);
 }
 
-static rcgns_status check_zones(const char *path, const char *solution, int64_t num_zones, const rcgns_new_zone *zones, rcgns_message *message)
+static rcgns_status check_zones(const char *path, const char *solution, int64_t num_zones, const rcgns_new_zone *zones,
+                                rcgns_message *message)
 {
   bool ok = num_zones > 0;
 
   for (int64_t i = 0; i < num_zones; i++) {
     const rcgns_new_zone *z = zones + i;
 
-    ok = ok && is_name(z->name) && (z->mesh ? z->mesh->num_cells > 0 : z->num_vertices[0] > 1 && z->num_vertices[1] > 1 && z->num_vertices[2] > 1);
+    ok = ok && is_name(z->name) &&
+         (z->mesh ? z->mesh->num_cells > 0 : z->num_vertices[0] > 1 && z->num_vertices[1] > 1 && z->num_vertices[2] > 1);
     ok = ok && (!z->num_fields || is_name(solution));
     for (int64_t f = 0; f < z->num_fields; f++) ok = ok && is_name(z->field[f].name);
   }
-  return ok ? RCGNS_OK : rc_fail(message, RCGNS_USAGE, "%s: zones need names of 1 to 32 characters and cells, fields a solution", path);
+  return ok ? RCGNS_OK
+            : rc_fail(message, RCGNS_USAGE, "%s: zones need names of 1 to 32 characters and cells, fields a solution", path);
 }
 
-rcgns_status rcgns_create(const char *path, double version, const char *solution, int64_t num_zones, const rcgns_new_zone *zones,
-                          rcgns_message *message)
+rcgns_status rcgns_create(const char *path, double version, const char *solution, int64_t num_zones,
+                          const rcgns_new_zone *zones, rcgns_message *message)
 {
   static const int64_t one = 1, two = 2, dimensions[2] = {3, 3};
-  draft                d   = {.ok = true};
+  draft                d              = {.ok = true};
   char                 part[PATH_MAX] = "";
   int64_t              base;
   rcgns_status         status = check_zones(path, solution, num_zones, zones, message);

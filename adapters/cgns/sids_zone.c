@@ -41,11 +41,11 @@ int rc_element(double version, int64_t code, rc_shape *shape)
   *shape = RC_NONE;
   if (c < 0 || c > MAX_CODE) return 0;
   switch (kind[c]) {
-  case 'T': *shape = RC_TETRA; break;
-  case 'P': *shape = RC_PYRA; break;
-  case 'E': *shape = RC_PENTA; break;
-  case 'H': *shape = RC_HEXA; break;
-  default: break;
+    case 'T': *shape = RC_TETRA; break;
+    case 'P': *shape = RC_PYRA; break;
+    case 'E': *shape = RC_PENTA; break;
+    case 'H': *shape = RC_HEXA; break;
+    default: break;
   }
   return nodes[c];
 }
@@ -164,7 +164,7 @@ static rcgns_status find_cuts(rcgns_file *file, const rc_zone *zone, rc_section 
   MPI_Allreduce(MPI_IN_PLACE, &rounds, 1, MPI_INT64_T, MPI_MAX, file->comm);
   {
     const int64_t begin = s.at, end = s.end;
-    bool          ok    = true;
+    bool          ok = true;
 
     for (int64_t r = 0; r < rounds; r++) {
       const int64_t lo = begin + r * BLOCK, hi = lo + BLOCK < end ? lo + BLOCK : end;
@@ -173,8 +173,9 @@ static rcgns_status find_cuts(rcgns_file *file, const rc_zone *zone, rc_section 
       ok = ok && (lo >= hi || scan_block(&s, block, lo, hi));
     }
     if (!ok || s.row != s.row_end || s.at != s.end)
-      status = rc_fail(message, RCGNS_IO, "%s: zone %s: section %s is damaged at its row %lld: its rows do not fill its connectivity",
-                       file->path, zone->name, rc_node_at(&file->tree, rc_node_at(&file->tree, section->connectivity)->parent)->name,
+      status = rc_fail(message, RCGNS_IO,
+                       "%s: zone %s: section %s is damaged at its row %lld: its rows do not fill its connectivity", file->path,
+                       zone->name, rc_node_at(&file->tree, rc_node_at(&file->tree, section->connectivity)->parent)->name,
                        (long long)s.row + 1);
   }
   RC_GOTO(done, status = rc_agree(file->comm, status, message));
@@ -214,8 +215,8 @@ rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_sectio
     RC_TRY(rc_read_1d(file, status, section->offsets, lo, n ? hi + 1 : lo, 'I', at, message));
     for (int64_t i = 0; i < n; i++)
       if (at[i] < 0 || at[i] > at[i + 1] || at[i + 1] > section->length)
-        status = rc_fail(message, RCGNS_IO, "%s: zone %s: ElementStartOffset is not ascending at row %lld", file->path, zone->name,
-                         (long long)(lo + i + 1));
+        status = rc_fail(message, RCGNS_IO, "%s: zone %s: ElementStartOffset is not ascending at row %lld", file->path,
+                         zone->name, (long long)(lo + i + 1));
     from = n ? at[0] : 0;
     to   = n ? at[n] : 0;
   } else if (n) {
@@ -236,7 +237,7 @@ rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_sectio
   for (int64_t p = 0; row < hi && status == RCGNS_OK; row++) { /* the scan found every row sound: drop what is not asked for */
     rc_shape      shape;
     const int64_t length = row_length(&s, in[p], &shape);
-    const int64_t skip   = section->layout == RC_MIXED ? 0 : 1, size = length + 1 - skip;
+    const int64_t skip = section->layout == RC_MIXED ? 0 : 1, size = length + 1 - skip;
 
     if (row >= lo) {
       at[row - lo] = kept;
@@ -252,14 +253,15 @@ rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_sectio
 
 /* ---- sections ----------------------------------------------------------------------------------------------------- */
 
-static rcgns_status broken(const rcgns_file *file, const rc_zone *zone, const char *section, const char *what, rcgns_message *message)
+static rcgns_status broken(const rcgns_file *file, const rc_zone *zone, const char *section, const char *what,
+                           rcgns_message *message)
 {
   return rc_fail(message, RCGNS_IO, "%s: zone %s: section %s %s", file->path, zone->name, section, what);
 }
 
 /* What a section is: false, if it holds nothing for us. */
-static rcgns_status read_section(const rcgns_file *file, const rc_zone *zone, int64_t node, rc_section *s, int64_t *code, bool *matters,
-                                 rcgns_message *message)
+static rcgns_status read_section(const rcgns_file *file, const rc_zone *zone, int64_t node, rc_section *s, int64_t *code,
+                                 bool *matters, rcgns_message *message)
 {
   const rc_tree *tree  = &file->tree;
   const char    *name  = rc_node_at(tree, node)->name;
@@ -269,14 +271,15 @@ static rcgns_status read_section(const rcgns_file *file, const rc_zone *zone, in
 
   *matters = false;
   if (!type) return broken(file, zone, name, "has no element type", message);
-  *code = modern_code(file->version, type[0]);
-  *s    = (rc_section){.layout = RC_FIXED};
+  *code  = modern_code(file->version, type[0]);
+  *s     = (rc_section){.layout = RC_FIXED};
   s->npe = rc_element(file->version, type[0], &s->shape);
   if (s->shape == RC_NONE && *code != MIXED && *code != NGON && *code != NFACE) {
     if (*code >= 0 && *code <= MAX_CODE) return RCGNS_OK;
     return broken(file, zone, name, "has an unknown element type", message);
   }
-  if (!range || range[0] < 1 || range[1] < range[0] || range[1] > TOO_MANY) return broken(file, zone, name, "has no valid ElementRange", message);
+  if (!range || range[0] < 1 || range[1] < range[0] || range[1] > TOO_MANY)
+    return broken(file, zone, name, "has no valid ElementRange", message);
   if (!rc_rind(tree, node, 1, rind)) return broken(file, zone, name, "has a malformed Rind", message);
   s->first        = range[0];
   s->num_rows     = range[1] - range[0] + 1;
@@ -305,10 +308,7 @@ static rcgns_status read_section(const rcgns_file *file, const rc_zone *zone, in
 }
 
 /* NGON_n whose rows are all edges: polygons in a plane. Rows of volumes are longer. */
-static bool is_flat(const rc_section *s)
-{
-  return s->length == s->num_rows * (s->layout == RC_OFFSETS ? 2 : 3);
-}
+static bool is_flat(const rc_section *s) { return s->length == s->num_rows * (s->layout == RC_OFFSETS ? 2 : 3); }
 
 static int by_first(const void *a, const void *b)
 {
@@ -317,7 +317,8 @@ static int by_first(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-static rcgns_status check_order(const rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t num, rcgns_message *message)
+static rcgns_status check_order(const rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t num,
+                                rcgns_message *message)
 {
   for (int64_t i = 1; i < num; i++)
     if (s[i].first < s[i - 1].first + s[i - 1].num_rows)
@@ -329,7 +330,7 @@ static rcgns_status check_order(const rcgns_file *file, const rc_zone *zone, con
 /* Sections of an unstructured zone. Not collective, alike on all ranks. */
 static rcgns_status find_sections(const rcgns_file *file, rc_zone *zone, bool *curved, rcgns_message *message)
 {
-  int64_t num = 0;
+  int64_t num  = 0;
   bool    flat = false;
 
   for (int64_t at = -1; (at = rc_tree_find(&file->tree, zone->node, at, "Elements_t", NULL)) >= 0;) num++;
@@ -354,7 +355,7 @@ static rcgns_status find_sections(const rcgns_file *file, rc_zone *zone, bool *c
   RC_TRY(check_order(file, zone, zone->section, zone->num_sections, message));
   RC_TRY(check_order(file, zone, zone->face, zone->num_face_sections, message));
   for (int64_t i = 0; i < zone->num_face_sections; i++) {
-    flat = flat || is_flat(zone->face + i);
+    flat                     = flat || is_flat(zone->face + i);
     zone->face[i].first_cell = zone->num_faces; /* of NGON_n: the index of its first face */
     zone->num_faces += zone->face[i].num_rows;
   }
@@ -373,7 +374,7 @@ static rcgns_status find_sections(const rcgns_file *file, rc_zone *zone, bool *c
 /* The cells of a zone that has NGON_n with ParentElements alone. Collective. */
 static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message *message)
 {
-  const rc_section *last  = zone->face + zone->num_face_sections - 1;
+  const rc_section *last     = zone->face + zone->num_face_sections - 1;
   int64_t           range[2] = {INT64_MIN, INT64_MIN}; /* -min, max */
   rcgns_status      status   = RCGNS_OK;
 
@@ -381,8 +382,9 @@ static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message
     const rc_section *s   = zone->face + i;
     const rc_node    *n   = rc_node_at(&file->tree, s->parents);
     const rc_box      box = rc_whole(n);
-    const int64_t     lo = rc_share(2 * s->num_rows, file->rank, file->size), hi = rc_share(2 * s->num_rows, file->rank + 1, file->size);
-    int64_t          *parent = rc_alloc(hi - lo, sizeof *parent);
+    const int64_t     lo  = rc_share(2 * s->num_rows, file->rank, file->size),
+                  hi      = rc_share(2 * s->num_rows, file->rank + 1, file->size);
+    int64_t *parent       = rc_alloc(hi - lo, sizeof *parent);
 
     if (n->nd != 2 || n->dim[0] < 2 || n->dim[1] != s->num_rows)
       status = rc_fail(message, RCGNS_IO, "%s: zone %s: ParentElements does not match its section", file->path, zone->name);
@@ -392,7 +394,8 @@ static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message
     for (int64_t k = 0; k < hi - lo && status == RCGNS_OK; k++) {
       if (!parent[k]) continue;
       if (parent[k] < 0 || parent[k] > TOO_MANY) {
-        status = rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld", file->path, zone->name, (long long)parent[k]);
+        status = rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld", file->path, zone->name,
+                         (long long)parent[k]);
         break;
       }
       if (-parent[k] > range[0]) range[0] = -parent[k];
@@ -406,8 +409,9 @@ static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message
   zone->parent_base = -range[0] >= last->first + last->num_rows ? last->first + last->num_rows : 1;
   zone->num_cells   = range[1] - zone->parent_base + 1;
   if (zone->num_cells > zone->num_faces / 2 + 1)
-    return rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld, which is more cells than %lld faces can bound",
-                   file->path, zone->name, (long long)range[1], (long long)zone->num_faces);
+    return rc_fail(message, RCGNS_GEOMETRY,
+                   "%s: zone %s: ParentElements names cell %lld, which is more cells than %lld faces can bound", file->path,
+                   zone->name, (long long)range[1], (long long)zone->num_faces);
   return RCGNS_OK;
 }
 
@@ -426,7 +430,8 @@ static rcgns_status read_sizes(const rcgns_file *file, rc_zone *zone, rcgns_mess
   if (!size) return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are missing", file->path, zone->name);
   zone->is_structured = strcmp(type, "Unstructured") != 0;
   if (!zone->is_structured) {
-    if (size[0] < 0 || size[0] > TOO_MANY) return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are not valid", file->path, zone->name);
+    if (size[0] < 0 || size[0] > TOO_MANY)
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are not valid", file->path, zone->name);
     zone->vertices[0] = zone->num_nodes = size[0];
     return RCGNS_OK;
   }
@@ -461,11 +466,13 @@ static rcgns_status find_coordinates(const rcgns_file *file, rc_zone *zone, rcgn
     if (zone->coordinate[c] < 0 && rc_tree_find(tree, grid, -1, NULL, "CoordinateR") >= 0)
       return rc_fail(message, RCGNS_IO, "%s: zone %s: its coordinates are not Cartesian: convert them", file->path, zone->name);
     n = zone->coordinate[c] < 0 ? NULL : rc_node_at(tree, zone->coordinate[c]);
-    if (!n || (n->kind != 'R' && n->kind != 'I')) return rc_fail(message, RCGNS_IO, "%s: zone %s: %s is missing or empty", file->path, zone->name, name[c]);
+    if (!n || (n->kind != 'R' && n->kind != 'I'))
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: %s is missing or empty", file->path, zone->name, name[c]);
     fits = n->nd == nd;
     for (int d = 0; fits && d < nd; d++)
       fits = n->dim[nd - 1 - d] == zone->vertices[d] + zone->rind[2 * d] + zone->rind[2 * d + 1];
-    if (!fits) return rc_fail(message, RCGNS_IO, "%s: zone %s: the size of %s does not match the zone", file->path, zone->name, name[c]);
+    if (!fits)
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: the size of %s does not match the zone", file->path, zone->name, name[c]);
   }
   return RCGNS_OK;
 }
@@ -558,9 +565,9 @@ static rcgns_status read_base(rcgns_file *file, int64_t base, rc_array *zones, r
 
 rcgns_status rc_zones_find(rcgns_file *file, const char *base, rcgns_message *message)
 {
-  rc_array     zones  = {.item = NULL};
-  rcgns_status status = RCGNS_OK;
-  int64_t      bases  = 0;
+  rc_array     zones     = {.item = NULL};
+  rcgns_status status    = RCGNS_OK;
+  int64_t      bases     = 0;
   char         list[512] = "";
 
   for (int64_t at = -1; status == RCGNS_OK && (at = rc_tree_find(&file->tree, 0, at, "CGNSBase_t", NULL)) >= 0;) {

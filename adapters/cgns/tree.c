@@ -13,10 +13,12 @@ enum { MAX_SOURCES = 10000, SMALL_VALUES = 512, SMALL_TEXT = 1 << 20 };
 int rc_width(const char *type)
 {
   switch (type[0]) {
-  case 'C': case 'B': return 1;
-  case 'X': return type[1] == '4' ? 8 : 16;
-  case 'I': case 'U': case 'R': return type[1] - '0';
-  default: return 0;
+    case 'C':
+    case 'B': return 1;
+    case 'I':
+    case 'U':
+    case 'R': return type[1] - '0';
+    default: return 0;
   }
 }
 
@@ -55,8 +57,8 @@ int64_t rc_tree_add(rc_tree *tree, int64_t parent, const rc_node *node)
   rc_node      *mine;
 
   if (!rc_reserve(&tree->node, 1, sizeof *node)) return -1;
-  mine  = rc_node_at(tree, at);
-  *mine = *node;
+  mine         = rc_node_at(tree, at);
+  *mine        = *node;
   mine->parent = parent;
   mine->child = mine->last = mine->next = -1;
   tree->node.count++;
@@ -92,7 +94,7 @@ char *rc_tree_path(const rc_tree *tree, int64_t node)
   const char *anchor = "";
   size_t      length = 0;
   char       *path;
-  int64_t     top    = node;
+  int64_t     top = node;
 
   for (; top > 0 && rc_node_at(tree, top)->anchor < 0; top = rc_node_at(tree, top)->parent)
     length += strlen(rc_node_at(tree, top)->name) + 1;

@@ -101,8 +101,8 @@ static inline int64_t cf_coordinates(cf_file *f, int64_t zone, const double *xyz
   }
   return grid;
 }
-static inline int64_t cf_section(cf_file *f, int64_t zone, const char *name, int64_t code, int64_t first, int64_t last, int64_t n,
-                                 const int64_t *connectivity)
+static inline int64_t cf_section(cf_file *f, int64_t zone, const char *name, int64_t code, int64_t first, int64_t last,
+                                 int64_t n, const int64_t *connectivity)
 {
   const int64_t at = cf_ints(f, zone, name, "Elements_t", 2, (int64_t[]){code, 0});
 
@@ -115,7 +115,8 @@ static inline void cf_offsets(cf_file *f, int64_t section, int64_t n, const int6
   cf_ints(f, section, "ElementStartOffset", "DataArray_t", n, offset);
 }
 /* A CellCenter solution with one field. */
-static inline int64_t cf_solution(cf_file *f, int64_t zone, const char *name, const char *field, int64_t n, const double *values)
+static inline int64_t cf_solution(cf_file *f, int64_t zone, const char *name, const char *field, int64_t n,
+                                  const double *values)
 {
   const int64_t at = cf_empty(f, zone, name, "FlowSolution_t");
 
@@ -151,14 +152,14 @@ static inline void cf_remove(const char *path)
 static inline double *cf_volumes(const remap_mesh *m, int64_t *open)
 {
   double *volume = tm_alloc_(m->num_cells, sizeof *volume), *area = tm_alloc_(3 * m->num_cells, sizeof *area);
-  double *size   = tm_alloc_(m->num_cells, sizeof *size), *origin = tm_alloc_(3 * m->num_cells, sizeof *origin);
-  bool   *seen   = tm_alloc_(m->num_cells, sizeof *seen);
+  double *size = tm_alloc_(m->num_cells, sizeof *size), *origin = tm_alloc_(3 * m->num_cells, sizeof *origin);
+  bool   *seen = tm_alloc_(m->num_cells, sizeof *seen);
 
   for (int64_t f = 0; f < m->num_faces; f++) {
     const int64_t *node = m->face_node + m->face_offset[f], n = m->face_offset[f + 1] - m->face_offset[f];
 
     for (int side = 0; side < 2; side++) {
-      const int64_t c   = side ? m->face_neighbour[f] : m->face_owner[f];
+      const int64_t c       = side ? m->face_neighbour[f] : m->face_owner[f];
       double        mean[3] = {0, 0, 0};
 
       if (c < 0) continue;
@@ -217,8 +218,8 @@ static inline rcgns_file *cf_open(const char *path, const rcgns_options *options
 /* Total volume of a file's mesh; every cell must be closed and of positive volume. Collective. */
 static inline double cf_total(const rcgns_file *file)
 {
-  const remap_mesh *mesh   = rcgns_mesh(file);
-  int64_t           open   = 0, inverted = 0;
+  const remap_mesh *mesh = rcgns_mesh(file);
+  int64_t           open = 0, inverted = 0;
   double           *volume = cf_volumes(mesh, &open), sum = 0.0;
 
   for (int64_t c = 0; c < mesh->num_cells; c++) sum += volume[c], inverted += !(volume[c] > 0.0);
@@ -263,8 +264,8 @@ static inline bool cf_is_agreed(const rcgns_message *message)
 /* ---- a small zoo: a hexahedron, two prisms, a pyramid and a tetrahedron, volume 2.5, four inner faces ---------------- */
 
 enum { CF_ZOO_NODES = 14, CF_ZOO_CELLS = 5 };
-static const double CF_ZOO_XYZ[3 * CF_ZOO_NODES] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 1, 0, 1, 1, 0, 2, 1, 0, 0,  0,  1,  1,   0,  1,
-                                                    2, 0, 1, 0, 1, 1, 1, 1, 1, 2, 1, 1, 0.5, 0.5, 2, 1.5, 0.5, 2};
+static const double  CF_ZOO_XYZ[3 * CF_ZOO_NODES] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 1, 0, 1, 1, 0, 2,   1,   0, 0,   0,   1,
+                                                     1, 0, 1, 2, 0, 1, 0, 1, 1, 1, 1, 1, 2, 1, 1, 0.5, 0.5, 2, 1.5, 0.5, 2};
 static const int64_t CF_ZOO_HEXA[8] = {1, 2, 5, 4, 7, 8, 11, 10}, CF_ZOO_PENTA[12] = {2, 3, 6, 8, 9, 12, 2, 6, 5, 8, 12, 11};
 static const int64_t CF_ZOO_PYRA[5] = {7, 8, 11, 10, 13}, CF_ZOO_TETRA[4] = {8, 9, 12, 14}, CF_ZOO_QUAD[4] = {1, 2, 8, 7};
 

@@ -8,7 +8,7 @@
 static char *complaints(const char *path)
 {
   char   command[700], line[512];
-  char  *all = tm_alloc_(1, 1);
+  char  *all  = tm_alloc_(1, 1);
   size_t used = 0;
   FILE  *pipe;
 
@@ -92,10 +92,10 @@ static bool check_output(const char *target)
 
 static void outputs_on_real_targets_add_no_error(void)
 {
-  static const char *const names[] = {"adflow_mdo_tutorial_rans_vol", "pycgns_naca12_hybrid_sol", "pycgns_sqnz_t3_8zones_sol",
-                                      "pycgns_sqnz_unstruct_2dom_sol", "cassiopee_case_hexa_v4", "maia_U_ATB_45_NGON_v42",
-                                      "cgns_vers3310_hexa_sol", "cgns_vers3000_hexa20label", "cgns_vers3110_hdf5-110_tetra",
-                                      "su2_bend_coarse_mixed", "hopr_spheremesh02_mixed", "msh2cgns_mandel_mixed"};
+  static const char *const names[] = {
+      "adflow_mdo_tutorial_rans_vol", "pycgns_naca12_hybrid_sol", "pycgns_sqnz_t3_8zones_sol", "pycgns_sqnz_unstruct_2dom_sol",
+      "cassiopee_case_hexa_v4",       "maia_U_ATB_45_NGON_v42",   "cgns_vers3310_hexa_sol",    "cgns_vers3000_hexa20label",
+      "cgns_vers3110_hdf5-110_tetra", "su2_bend_coarse_mixed",    "hopr_spheremesh02_mixed",   "msh2cgns_mandel_mixed"};
 
   for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
     char path[512], name[64];
@@ -114,13 +114,14 @@ static void outputs_on_real_targets_add_no_error(void)
 
 static void new_files_have_no_error(void)
 {
-  tm_mesh              *whole  = tm_refined((int[]){4, 3, 3}, tm_right_half, NULL, NULL);
-  double               *volume = cf_volumes(&whole->view, NULL), grid[24];
-  const rcgns_new_field field  = {"Density", volume};
-  const rcgns_new_zone  zone[2] = {{.name = "Poly", .mesh = &whole->view, .num_fields = 1, .field = &field},
-                                   {.name = "Block", .num_vertices = {2, 2, 2}, .node_xyz = grid, .num_fields = 1, .field = &field}};
-  rcgns_message         why;
-  char                  path[64], *found;
+  tm_mesh              *whole   = tm_refined((int[]){4, 3, 3}, tm_right_half, NULL, NULL);
+  double               *volume  = cf_volumes(&whole->view, NULL), grid[24];
+  const rcgns_new_field field   = {"Density", volume};
+  const rcgns_new_zone  zone[2] = {
+       {.name = "Poly", .mesh = &whole->view, .num_fields = 1, .field = &field},
+       {.name = "Block", .num_vertices = {2, 2, 2}, .node_xyz = grid, .num_fields = 1, .field = &field}};
+  rcgns_message why;
+  char          path[64], *found;
 
   for (int i = 0; i < 24; i++) grid[i] = (double)(i / 3 >> i % 3 & 1);
   cf_path(path, "created");

@@ -45,8 +45,10 @@ static int64_t mixed_rows(const int64_t code[6], int64_t polygon, int64_t *out, 
   const struct {
     int64_t        code, n;
     const int64_t *node;
-  } row[] = {{code[5], 4, CF_ZOO_QUAD}, {code[3], 8, CF_ZOO_HEXA},  {code[2], 6, CF_ZOO_PENTA}, {3, 2, CF_ZOO_QUAD},
-             {polygon, 5, pentagon},    {code[2], 6, CF_ZOO_PENTA + 6}, {code[1], 5, CF_ZOO_PYRA},  {code[0], 4, CF_ZOO_TETRA}};
+  } row[] = {
+      {code[5], 4, CF_ZOO_QUAD}, {code[3], 8, CF_ZOO_HEXA},      {code[2], 6, CF_ZOO_PENTA}, {3, 2, CF_ZOO_QUAD},
+      {polygon, 5, pentagon},    {code[2], 6, CF_ZOO_PENTA + 6}, {code[1], 5, CF_ZOO_PYRA},  {code[0], 4, CF_ZOO_TETRA},
+  };
   int64_t at = 0;
 
   *rows = 0;
@@ -60,7 +62,8 @@ static int64_t mixed_rows(const int64_t code[6], int64_t polygon, int64_t *out, 
   return at;
 }
 
-static void check_mixed(double version, int64_t mixed, const int64_t code[6], int64_t polygon, int with_offsets, const char *what)
+static void check_mixed(double version, int64_t mixed, const int64_t code[6], int64_t polygon, int with_offsets,
+                        const char *what)
 {
   cf_file      *f    = cf_new(version);
   const int64_t zone = cf_zoo_zone(f, cf_base(f), "Zoo");
@@ -81,10 +84,7 @@ static void mixed_rows_are_found_with_and_without_an_index(void)
   check_mixed(4.2, 20, CODES, 0, 1, "mixed_index");
 }
 
-static void files_of_version_3_0_use_other_codes(void)
-{
-  check_mixed(3.0, 21, CODES_3_0, 0, 0, "mixed_30");
-}
+static void files_of_version_3_0_use_other_codes(void) { check_mixed(3.0, 21, CODES_3_0, 0, 0, "mixed_30"); }
 
 static void old_mixed_rows_may_be_polygons(void)
 {
@@ -97,19 +97,19 @@ static void long_mixed_sections_are_cut_between_ranks(void)
 {
   enum { N = 16, CELLS = N * N * N, P = N + 1 };
   for (int with_offsets = 0; with_offsets < 2; with_offsets++) {
-    cf_file      *f    = cf_new(4.2);
-    const int64_t zone = cf_zone(f, cf_base(f), "Long", 1, (int64_t[]){P * P * P, CELLS, 0});
-    double       *xyz = tm_alloc_(3 * P * P * P, sizeof *xyz), *value = tm_alloc_(CELLS, sizeof *value), sum = 0.0;
-    int64_t      *row = tm_alloc_(14 * CELLS, sizeof *row), *offset = tm_alloc_(2 * CELLS + 1, sizeof *offset), at = 0;
-    char          path[64];
-    rcgns_file   *file;
+    cf_file       *f    = cf_new(4.2);
+    const int64_t  zone = cf_zone(f, cf_base(f), "Long", 1, (int64_t[]){P * P * P, CELLS, 0});
+    double        *xyz = tm_alloc_(3 * P * P * P, sizeof *xyz), *value = tm_alloc_(CELLS, sizeof *value), sum = 0.0;
+    int64_t       *row = tm_alloc_(14 * CELLS, sizeof *row), *offset = tm_alloc_(2 * CELLS + 1, sizeof *offset), at = 0;
+    char           path[64];
+    rcgns_file    *file;
     rcgns_solution chosen;
     rcgns_message  why;
 
     for (int64_t i = 0; i < P * P * P; i++)
       for (int d = 0; d < 3; d++) xyz[3 * i + d] = (double)(i / (int64_t[]){1, P, P * P}[d] % P);
     for (int64_t c = 0; c < CELLS; c++) {
-      const int64_t n = 1 + c % N + P * (c / N % N) + P * P * (c / N / N);
+      const int64_t n       = 1 + c % N + P * (c / N % N) + P * P * (c / N / N);
       const int64_t node[8] = {n, n + 1, n + 1 + P, n + P, n + P * P, n + 1 + P * P, n + 1 + P + P * P, n + P + P * P};
 
       offset[2 * c] = at;
@@ -148,8 +148,8 @@ static void long_mixed_sections_are_cut_between_ranks(void)
 
 static void higher_order_elements_are_taken_by_their_corners(void)
 {
-  cf_file      *f    = cf_new(4.2);
-  const int64_t zone = cf_zone(f, cf_base(f), "Curved", 1, (int64_t[]){20, 1, 0});
+  cf_file      *f       = cf_new(4.2);
+  const int64_t zone    = cf_zone(f, cf_base(f), "Curved", 1, (int64_t[]){20, 1, 0});
   double        xyz[60] = {0};
   int64_t       node[20];
   char          path[64];
@@ -171,8 +171,8 @@ static void higher_order_elements_are_taken_by_their_corners(void)
 
 static void flat_cells_let_their_neighbours_join(void)
 {
-  cf_file      *f    = cf_new(4.2);
-  const int64_t zone = cf_zoo_zone(f, cf_base(f), "Flat");
+  cf_file      *f        = cf_new(4.2);
+  const int64_t zone     = cf_zoo_zone(f, cf_base(f), "Flat");
   const int64_t node[24] = {1, 2, 5, 4, 7, 8, 11, 10, 2, 3, 6, 5, 8, 9, 12, 11, 2, 2, 5, 5, 8, 8, 11, 11};
   char          path[64];
   rcgns_file   *file;
@@ -272,10 +272,7 @@ static void check_poly(tm_mesh *whole, poly_style style, const char *what)
   tm_free(whole);
 }
 
-static tm_mesh *refined(void)
-{
-  return tm_refined((int[]){4, 3, 3}, tm_right_half, tm_warp, &(tm_warping){0.03, 0.7});
-}
+static tm_mesh *refined(void) { return tm_refined((int[]){4, 3, 3}, tm_right_half, tm_warp, &(tm_warping){0.03, 0.7}); }
 
 static void polyhedra_are_read_in_both_layouts(void)
 {
@@ -283,15 +280,9 @@ static void polyhedra_are_read_in_both_layouts(void)
   check_poly(refined(), INLINE, "poly_inline");
 }
 
-static void missing_signs_are_repaired(void)
-{
-  check_poly(refined(), UNSIGNED, "poly_unsigned");
-}
+static void missing_signs_are_repaired(void) { check_poly(refined(), UNSIGNED, "poly_unsigned"); }
 
-static void signs_that_are_all_reversed_turn_the_zone_round(void)
-{
-  check_poly(refined(), REVERSED, "poly_reversed");
-}
+static void signs_that_are_all_reversed_turn_the_zone_round(void) { check_poly(refined(), REVERSED, "poly_reversed"); }
 
 static void cells_come_from_parents_alone_in_either_numbering(void)
 {
@@ -304,7 +295,7 @@ static void a_face_that_a_cell_lists_twice_bounds_nothing(void)
   /* the hexahedron 1-8 as six faces, and a seventh of its own nodes inside, listed from both sides */
   const int64_t node[28] = {1, 4, 3, 2, 1, 2, 6, 5, 2, 3, 7, 6, 3, 4, 8, 7, 1, 5, 8, 4, 5, 6, 7, 8, 1, 2, 7, 8};
   const int64_t at[8] = {0, 4, 8, 12, 16, 20, 24, 28}, cell[8] = {1, 2, 3, 4, 7, 5, 6, -7}, cut[2] = {0, 8};
-  cf_file      *f = cf_new(4.2);
+  cf_file      *f    = cf_new(4.2);
   const int64_t zone = cf_zone(f, cf_base(f), "Baffle", 1, (int64_t[]){8, 1, 0});
   double        xyz[24];
   char          path[64];
@@ -335,8 +326,9 @@ static void what_create_writes_is_read_back(void)
   rcgns_file     *file;
   rcgns_solution  chosen;
   rcgns_new_field field[2] = {{"Volume", want}, {"Volume", cells}};
-  rcgns_new_zone  zone[2]  = {{.name = "Poly", .mesh = &whole->view, .num_fields = 1, .field = field},
-                              {.name = "Block", .num_vertices = {5, 4, 3}, .node_xyz = grid, .num_fields = 1, .field = field + 1}};
+  rcgns_new_zone  zone[2]  = {
+        {.name = "Poly", .mesh = &whole->view, .num_fields = 1, .field = field},
+        {.name = "Block", .num_vertices = {5, 4, 3}, .node_xyz = grid, .num_fields = 1, .field = field + 1}};
 
   for (int i = 0; i < 60; i++) grid[3 * i] = i % 5, grid[3 * i + 1] = i / 5 % 4, grid[3 * i + 2] = i / 20 + 2.0;
   for (int i = 0; i < 24; i++) cells[i] = i;
@@ -367,9 +359,10 @@ static void put_block(cf_file *f, int64_t base, const char *name, double x0, dou
 {
   const int64_t v[3] = {5, 4, 6}, r = rind;
   const int64_t node[3] = {v[2] + 3 * r, v[1] + 2 * r, v[0] + r}, cell[3] = {v[2] - 1 + r, v[1] - 1, v[0] - 1 + 3 * r};
-  const int64_t zone    = cf_zone(f, base, name, 3, (int64_t[]){v[0], v[1], v[2], v[0] - 1, v[1] - 1, v[2] - 1, 0, 0, 0});
-  double       *xyz     = tm_alloc_(3 * node[0] * node[1] * node[2], sizeof *xyz), *value = tm_alloc_(cell[0] * cell[1] * cell[2], sizeof *value);
-  int64_t       grid, sol;
+  const int64_t zone = cf_zone(f, base, name, 3, (int64_t[]){v[0], v[1], v[2], v[0] - 1, v[1] - 1, v[2] - 1, 0, 0, 0});
+  double       *xyz  = tm_alloc_(3 * node[0] * node[1] * node[2], sizeof *xyz),
+         *value      = tm_alloc_(cell[0] * cell[1] * cell[2], sizeof *value);
+  int64_t grid, sol;
 
   for (int64_t i = 0; i < node[0] * node[1] * node[2]; i++) {
     xyz[3 * i]     = x0 + (x1 - x0) * (double)(i % node[2]) / (double)(v[0] - 1);
@@ -416,7 +409,7 @@ static void blocks_have_rind_stripped_and_hands_agreed(void)
 
 static void scale_and_transform_move_the_mesh(void)
 {
-  cf_file      *f    = cf_new(3.3);
+  cf_file      *f = cf_new(3.3);
   char          path[64];
   rcgns_file   *file;
   rcgns_options options;
@@ -426,11 +419,11 @@ static void scale_and_transform_move_the_mesh(void)
   cf_path(path, "moved");
   cf_write(f, path);
   rcgns_options_default(&options);
-  options.scale              = 0.5;
-  options.transform[0][0]    = -1.0; /* a mirror: the cells stay positive */
-  options.transform[1][3]    = 7.0;
+  options.scale           = 0.5;
+  options.transform[0][0] = -1.0; /* a mirror: the cells stay positive */
+  options.transform[1][3] = 7.0;
   if ((file = cf_open(path, &options))) {
-    const remap_mesh *m = rcgns_mesh(file);
+    const remap_mesh *m     = rcgns_mesh(file);
     double            least = HUGE_VAL;
 
     RT_NEAR(cf_total(file), 60.0 / 8.0, 1e-13);
@@ -521,12 +514,18 @@ static void names_tell_natures(void)
     int          is_integer;
     remap_nature nature;
     int          known;
-  } want[] = {{"Density", 0, REMAP_CONSERVED, 1},          {"MomentumX", 0, REMAP_CONSERVED, 1},
-              {"TurbulentSANuTildeDensity", 0, REMAP_CONSERVED, 1}, {"Momentum_x", 0, REMAP_CONSERVED, 1},
-              {"VelocityX", 0, REMAP_MASS_SPECIFIC, 1},    {"VelocitySound", 0, REMAP_VOLUME_MEAN, 1},
-              {"Pressure", 0, REMAP_VOLUME_MEAN, 1},       {"ResDensity", 0, REMAP_VOLUME_MEAN, 1},
-              {"cellN", 0, REMAP_FLAG, 1},                 {"Iblank", 0, REMAP_FLAG, 1},
-              {"Colour", 0, REMAP_VOLUME_MEAN, 0},         {"Colour", 1, REMAP_FLAG, 1}};
+  } want[] = {{"Density", 0, REMAP_CONSERVED, 1},
+              {"MomentumX", 0, REMAP_CONSERVED, 1},
+              {"TurbulentSANuTildeDensity", 0, REMAP_CONSERVED, 1},
+              {"Momentum_x", 0, REMAP_CONSERVED, 1},
+              {"VelocityX", 0, REMAP_MASS_SPECIFIC, 1},
+              {"VelocitySound", 0, REMAP_VOLUME_MEAN, 1},
+              {"Pressure", 0, REMAP_VOLUME_MEAN, 1},
+              {"ResDensity", 0, REMAP_VOLUME_MEAN, 1},
+              {"cellN", 0, REMAP_FLAG, 1},
+              {"Iblank", 0, REMAP_FLAG, 1},
+              {"Colour", 0, REMAP_VOLUME_MEAN, 0},
+              {"Colour", 1, REMAP_FLAG, 1}};
 
   for (size_t i = 0; i < sizeof want / sizeof *want; i++) {
     int known;
@@ -536,10 +535,11 @@ static void names_tell_natures(void)
   }
 }
 
-RT_MAIN(RT_CASE(sections_count_by_element_number_and_surfaces_are_no_cells), RT_CASE(mixed_rows_are_found_with_and_without_an_index),
-        RT_CASE(files_of_version_3_0_use_other_codes), RT_CASE(old_mixed_rows_may_be_polygons),
-        RT_CASE(long_mixed_sections_are_cut_between_ranks), RT_CASE(higher_order_elements_are_taken_by_their_corners),
-        RT_CASE(flat_cells_let_their_neighbours_join), RT_CASE(polyhedra_are_read_in_both_layouts), RT_CASE(missing_signs_are_repaired),
+RT_MAIN(RT_CASE(sections_count_by_element_number_and_surfaces_are_no_cells),
+        RT_CASE(mixed_rows_are_found_with_and_without_an_index), RT_CASE(files_of_version_3_0_use_other_codes),
+        RT_CASE(old_mixed_rows_may_be_polygons), RT_CASE(long_mixed_sections_are_cut_between_ranks),
+        RT_CASE(higher_order_elements_are_taken_by_their_corners), RT_CASE(flat_cells_let_their_neighbours_join),
+        RT_CASE(polyhedra_are_read_in_both_layouts), RT_CASE(missing_signs_are_repaired),
         RT_CASE(signs_that_are_all_reversed_turn_the_zone_round), RT_CASE(cells_come_from_parents_alone_in_either_numbering),
         RT_CASE(a_face_that_a_cell_lists_twice_bounds_nothing), RT_CASE(what_create_writes_is_read_back),
         RT_CASE(blocks_have_rind_stripped_and_hands_agreed), RT_CASE(scale_and_transform_move_the_mesh),

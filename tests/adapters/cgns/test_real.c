@@ -1,4 +1,4 @@
-/* Real files of many codes: every one that holds volume cells is read, and agrees with what was measured once by other means. */
+/* Real files of many codes: every one that holds volume cells is read, and agrees with what other means once measured. */
 #include "files.h"
 
 static const struct {
@@ -27,8 +27,9 @@ static const struct {
              {"hopr_spheremesh04_mixed", 3, 1904, 7.52381294827e13, 1e-11},
              {"msh2cgns_mandel_mixed", 1, 23566, 1.0, 1e-12}};
 
-static const char *const FLAT[] = {"adflow_nozzle_iblank_surf", "cassiopee_naca_IBMO_overset", "su2_flamelet_medium_2d",
-                                   "msh2cgns_9v_6e_transient_sol", "msh2cgns_cubic_MIXED_v41", "msh2cgns_quadratic_QUAD9_v41"};
+static const char *const FLAT[] = {"adflow_nozzle_iblank_surf", "cassiopee_naca_IBMO_overset",
+                                   "su2_flamelet_medium_2d",    "msh2cgns_9v_6e_transient_sol",
+                                   "msh2cgns_cubic_MIXED_v41",  "msh2cgns_quadratic_QUAD9_v41"};
 
 /* Path of a real file; false: the folder is not there, the case is skipped. */
 static int real_file(char path[512], const char *name)
@@ -164,7 +165,8 @@ static void refuse_solution(const char *name, const char *solution, rcgns_status
 static void vertex_fields_are_refused_by_name(void)
 {
   refuse_solution("cassiopee_case_hexa_v4", NULL, RCGNS_IO, "FlowSolution is Vertex-located (fields: Density)");
-  refuse_solution("cgns_vers3310_hexa_sol", "FlowSolution", RCGNS_IO, "FlowSolution is Vertex-located (fields: Density, Pressure)");
+  refuse_solution("cgns_vers3310_hexa_sol", "FlowSolution", RCGNS_IO,
+                  "FlowSolution is Vertex-located (fields: Density, Pressure)");
 }
 
 static void a_solution_that_is_not_there_is_refused_with_those_that_are(void)

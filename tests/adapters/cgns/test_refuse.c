@@ -8,7 +8,8 @@ static void refuse_path(const char *path, rcgns_status status, const char *words
   rcgns_message why  = {""};
 
   RT_EQ(rcgns_open(MPI_COMM_WORLD, path, NULL, &file, &why), status);
-  if (!RT_CHECK(strstr(why.text, words) && strstr(why.text, path)) && rt_rank() == 0) printf("# \"%s\", want \"%s\"\n", why.text, words);
+  if (!RT_CHECK(strstr(why.text, words) && strstr(why.text, path)) && rt_rank() == 0)
+    printf("# \"%s\", want \"%s\"\n", why.text, words);
   RT_CHECK(!strchr(why.text, '\n'));
   RT_CHECK(cf_is_agreed(&why));
   RT_CHECK(!file);
@@ -48,15 +49,9 @@ static int64_t cube(cf_file *f)
 }
 static const int64_t CORNERS[8] = {1, 2, 3, 4, 5, 6, 7, 8};
 
-static void a_missing_file_is_refused(void)
-{
-  refuse_path("cgns_that_is_not_there.cgns", RCGNS_IO, "No such file");
-}
+static void a_missing_file_is_refused(void) { refuse_path("cgns_that_is_not_there.cgns", RCGNS_IO, "No such file"); }
 
-static void a_folder_is_refused(void)
-{
-  refuse_path(".", RCGNS_IO, "not a file");
-}
+static void a_folder_is_refused(void) { refuse_path(".", RCGNS_IO, "not a file"); }
 
 static void a_file_of_text_is_refused(void)
 {
@@ -73,7 +68,7 @@ static void a_file_of_text_is_refused(void)
 static void a_truncated_hdf5_file_is_refused(void)
 {
   char     path[64];
-  cf_file *f    = cf_new(4.2);
+  cf_file *f = cf_new(4.2);
 
   cf_section(f, cube(f), "Hexa", 17, 1, 1, 8, CORNERS);
   cf_write(f, cf_path(path, "truncated"));
@@ -102,10 +97,10 @@ static void a_base_without_volume_cells_is_refused(void)
 
 static void missing_coordinates_are_refused(void)
 {
-  cf_file      *f = cf_new(4.2);
-  int64_t       zone = cf_zone(f, cf_base(f), "Bare", 1, (int64_t[]){8, 1, 0});
-  int64_t       grid;
-  const double  x[8] = {0};
+  cf_file     *f    = cf_new(4.2);
+  int64_t      zone = cf_zone(f, cf_base(f), "Bare", 1, (int64_t[]){8, 1, 0});
+  int64_t      grid;
+  const double x[8] = {0};
 
   cf_section(f, zone, "Hexa", 17, 1, 1, 8, CORNERS);
   refuse(f, RCGNS_IO, "zone Base/Bare: it has no GridCoordinates");
@@ -147,7 +142,8 @@ static void coordinates_that_are_no_numbers_are_refused(void)
     int64_t  zone;
 
     for (int i = 0; i < 24; i++) xyz[i] = i == 16 ? (double)NAN : (double)(i / 3 >> i % 3 & 1);
-    zone = block ? cf_zone(f, cf_base(f), "Nan", 3, (int64_t[]){2, 2, 2, 1, 1, 1, 0, 0, 0}) : cf_zone(f, cf_base(f), "Nan", 1, (int64_t[]){8, 1, 0});
+    zone = block ? cf_zone(f, cf_base(f), "Nan", 3, (int64_t[]){2, 2, 2, 1, 1, 1, 0, 0, 0})
+                 : cf_zone(f, cf_base(f), "Nan", 1, (int64_t[]){8, 1, 0});
     if (!block) cf_section(f, zone, "Hexa", 17, 1, 1, 8, (int64_t[]){1, 2, 4, 3, 5, 6, 8, 7});
     cf_coordinates(f, zone, xyz, block ? 3 : 1, block ? (int64_t[]){2, 2, 2} : (int64_t[]){8});
     refuse(f, RCGNS_GEOMETRY, "zone Base/Nan: node 6 has a coordinate that is not a finite number");
@@ -159,7 +155,7 @@ static void node_numbers_out_of_range_are_refused(void)
   static const int64_t bad[3] = {9, 0, INT64_MAX};
 
   for (int i = 0; i < 3; i++) {
-    cf_file      *f = cf_new(4.2);
+    cf_file      *f    = cf_new(4.2);
     const int64_t zone = cube(f);
     int64_t       node[8];
 
@@ -194,7 +190,8 @@ static void sections_of_the_wrong_size_are_refused(void)
 
 static void mixed_rows_that_do_not_fit_are_refused(void)
 {
-  const int64_t row[4][9] = {{17, 1, 2, 3, 4, 5, 6, 7, 8}, {10, 1, 2, 3, 4, 5, 6, 7, 8}, {77, 1, 2, 3, 4, 5, 6, 7, 8}, {18, 1, 2, 3, 4, 5, 6, 7, 8}};
+  const int64_t row[4][9] = {
+      {17, 1, 2, 3, 4, 5, 6, 7, 8}, {10, 1, 2, 3, 4, 5, 6, 7, 8}, {77, 1, 2, 3, 4, 5, 6, 7, 8}, {18, 1, 2, 3, 4, 5, 6, 7, 8}};
 
   for (int i = 1; i < 4; i++)
     for (int with_offsets = 0; with_offsets < 2; with_offsets++) {
@@ -221,8 +218,10 @@ static void zones_with_impossible_sizes_are_refused(void)
   zone = cf_zone(f, cf_base(f), "Odd", 3, (int64_t[]){2, 2, 2, 1, 2, 1, 0, 0, 0});
   cf_coordinates(f, zone, CF_ZOO_XYZ, 3, (int64_t[]){2, 2, 2});
   refuse(f, RCGNS_IO, "zone Base/Odd: its sizes are not valid");
-  f    = cf_new(4.2);
-  zone = cf_zone(f, cf_base(f), "Huge", 3, (int64_t[]){INT64_C(1) << 40, INT64_C(1) << 40, 2, (INT64_C(1) << 40) - 1, (INT64_C(1) << 40) - 1, 1, 0, 0, 0});
+  f = cf_new(4.2);
+  zone =
+      cf_zone(f, cf_base(f), "Huge", 3,
+              (int64_t[]){INT64_C(1) << 40, INT64_C(1) << 40, 2, (INT64_C(1) << 40) - 1, (INT64_C(1) << 40) - 1, 1, 0, 0, 0});
   cf_coordinates(f, zone, CF_ZOO_XYZ, 3, (int64_t[]){2, 2, 2});
   refuse(f, RCGNS_IO, "zone Base/Huge: its sizes are not valid");
   f    = cf_new(4.2);
@@ -233,8 +232,8 @@ static void zones_with_impossible_sizes_are_refused(void)
 
 static void a_face_of_three_elements_is_refused(void)
 {
-  cf_file      *f = cf_new(4.2);
-  const int64_t zone = cf_zoo_zone(f, cf_base(f), "Zoo");
+  cf_file      *f        = cf_new(4.2);
+  const int64_t zone     = cf_zoo_zone(f, cf_base(f), "Zoo");
   const int64_t node[12] = {8, 9, 12, 14, 9, 8, 12, 3, 8, 9, 12, 13};
 
   cf_section(f, zone, "Tetra", 10, 1, 3, 12, node);
@@ -244,8 +243,8 @@ static void a_face_of_three_elements_is_refused(void)
 /* The faces of two hexahedra side by side, 1 .. 11, the sixth between them. */
 static void put_faces(cf_file *f, int64_t zone)
 {
-  const int64_t face[44] = {1, 4, 5, 2, 1, 2,  8, 7,  4, 10, 11, 5, 1, 7, 10, 4, 7, 8, 11, 10, 2, 5, 11, 8,
-                            2, 5, 6, 3, 2, 3,  9, 8,  5, 11, 12, 6, 3, 6, 12, 9, 8, 9, 12, 11};
+  const int64_t face[44] = {1,  4, 5, 2, 1, 2, 8, 7, 4, 10, 11, 5,  1,  7, 10, 4, 7,  8, 11, 10, 2,  5,
+                            11, 8, 2, 5, 6, 3, 2, 3, 9, 8,  5,  11, 12, 6, 3,  6, 12, 9, 8,  9,  12, 11};
   int64_t       at[12];
 
   for (int i = 0; i < 12; i++) at[i] = 4 * i;
@@ -254,8 +253,8 @@ static void put_faces(cf_file *f, int64_t zone)
 
 static void a_face_of_three_polyhedra_is_refused(void)
 {
-  cf_file      *f       = cf_new(4.2);
-  const int64_t zone    = cf_zoo_zone(f, cf_base(f), "Zoo");
+  cf_file      *f        = cf_new(4.2);
+  const int64_t zone     = cf_zoo_zone(f, cf_base(f), "Zoo");
   const int64_t cell[18] = {1, 2, 3, 4, 5, 6, -6, 7, 8, 9, 10, 11, 6, 7, 8, 9, 10, 11}, at[4] = {0, 6, 12, 18};
 
   put_faces(f, zone);
@@ -322,7 +321,8 @@ static void an_open_cell_is_refused_by_the_library(void)
     RT_EQ(remap_set_mesh(ctx, REMAP_SOURCE, rcgns_mesh(file)), REMAP_OK);
     RT_EQ(remap_set_mesh(ctx, REMAP_TARGET, rcgns_mesh(file)), REMAP_OK);
     RT_EQ(remap_build(ctx), REMAP_BAD_MESH);
-    if (!RT_CHECK(strstr(remap_message(ctx), path) && strstr(remap_message(ctx), "Base/Zoo"))) printf("# %s\n", remap_message(ctx));
+    if (!RT_CHECK(strstr(remap_message(ctx), path) && strstr(remap_message(ctx), "Base/Zoo")))
+      printf("# %s\n", remap_message(ctx));
     remap_destroy(&ctx);
     rcgns_close(&file);
   }
@@ -331,8 +331,8 @@ static void an_open_cell_is_refused_by_the_library(void)
 
 static void fields_of_the_wrong_size_are_refused(void)
 {
-  cf_file       *f    = cf_new(4.2);
-  const int64_t  zone = cf_zoo_zone(f, cf_base(f), "Zoo");
+  cf_file       *f        = cf_new(4.2);
+  const int64_t  zone     = cf_zoo_zone(f, cf_base(f), "Zoo");
   const double   value[6] = {0};
   double         mine[8];
   char           path[64];
@@ -369,8 +369,8 @@ static void fields_of_the_wrong_size_are_refused(void)
 
 static void a_field_that_one_zone_lacks_is_refused_there(void)
 {
-  cf_file       *f    = cf_new(4.2);
-  const int64_t  base = cf_base(f);
+  cf_file       *f        = cf_new(4.2);
+  const int64_t  base     = cf_base(f);
   const double   value[1] = {7};
   double         mine[2];
   char           path[64];

@@ -23,7 +23,8 @@ static void make_target(const char *path)
   sol = cf_empty(f, block, "Sol", "FlowSolution_t");
   cf_text(f, sol, "GridLocation", "GridLocation_t", "CellCenter");
   cf_ints(f, sol, "Rind", "Rind_t", 6, (int64_t[]){1, 1, 0, 0, 0, 0});
-  cf_text(f, cf_put(f, sol, "Density", "DataArray_t", "R4", 3, (int64_t[]){2, 2, 5}, 'R', value), "DataClass", "DataClass_t", "Dimensional");
+  cf_text(f, cf_put(f, sol, "Density", "DataArray_t", "R4", 3, (int64_t[]){2, 2, 5}, 'R', value), "DataClass", "DataClass_t",
+          "Dimensional");
   cf_put(f, sol, "Pressure", "DataArray_t", "R8", 3, (int64_t[]){2, 2, 5}, 'R', value);
   zone = cf_zoo_zone(f, base, "Zoo");
   cf_section(f, zone, "Hexa", 17, 1, 1, 8, CF_ZOO_HEXA);
@@ -77,7 +78,7 @@ static rcgns_status write_fields(const char *from, const char *to, const char *s
   rcgns_status status = RCGNS_MEMORY;
 
   if (file) {
-    double               *a        = values_of(file, 1.0), *b = values_of(file, 0.1);
+    double               *a = values_of(file, 1.0), *b = values_of(file, 0.1);
     const rcgns_new_field field[2] = {{"Density", a}, {"MomentumX", b}};
 
     status = rcgns_write(file, to, solution, 2, field, why);
@@ -113,7 +114,7 @@ static void fields_are_replaced_and_added_and_the_rest_stays(void)
   if ((file = cf_open(to, NULL))) {
     const rc_node *series = node_at(file, "Base", "Odd one", "series", NULL);
     const rc_node *class  = node_at(file, "Base", "Block", "Sol", "Density");
-    char           text[64];
+    char text[64];
 
     RT_NEAR(rcgns_get_info(file)->version, 3.4, 1e-6);
     RT_NEAR(cf_total(file), 12.0 + 2.0, 1e-12);
@@ -127,7 +128,10 @@ static void fields_are_replaced_and_added_and_the_rest_stays(void)
     RT_CHECK(!node_at(file, "Base", "Block", "Sol", "Rind"));
     RT_CHECK(series && rc_count(series) == 3000 && series->kind == 'R');
     RT_CHECK(class && class->child >= 0 && !strcmp(rc_node_at(&file->tree, class->child)->name, "DataClass"));
-    if (class) rc_tree_string(&file->tree, rc_tree_find(&file->tree, rc_node_at(&file->tree, class->parent)->parent, -1, NULL, "ZoneType"), text, sizeof text);
+    if (class)
+      rc_tree_string(&file->tree,
+                     rc_tree_find(&file->tree, rc_node_at(&file->tree, class->parent)->parent, -1, NULL, "ZoneType"), text,
+                     sizeof text);
     RT_STR(text, "Structured");
     {
       double        pressure[12];
@@ -176,7 +180,7 @@ static void the_bytes_do_not_depend_on_ranks_or_time(void)
 
     RT_EQ(rcgns_open(MPI_COMM_SELF, from, NULL, &file, &why), RCGNS_OK);
     if (file) {
-      double               *a        = values_of(file, 1.0), *b = values_of(file, 0.1);
+      double               *a = values_of(file, 1.0), *b = values_of(file, 0.1);
       const rcgns_new_field field[2] = {{"Density", a}, {"MomentumX", b}};
 
       RT_EQ(rcgns_write(file, one, "Sol", 2, field, &why), RCGNS_OK);
