@@ -68,6 +68,15 @@ typedef struct polygon {
   double  reach;    /* largest distance of the others from it, by any one coordinate */
 } polygon;
 
+/* A crossing in double-double, relative to its edge's first vertex. */
+typedef struct memo {
+  int    mesh;
+  rm_lid edge, triangle;
+  rm_dd  delta[3];
+} memo;
+
+enum { NUM_MEMOS = 256 };
+
 typedef struct work {
   const rm_part    *part;
   const rm_overlay *o;
@@ -84,6 +93,7 @@ typedef struct work {
   int               num_polygons;
   rm_dd           (*exact)[10]; /* [num_slots] sums of those marked AGAIN */
   int64_t           exact_room;
+  memo             *memo; /* [NUM_MEMOS] */
   remap_status      status;
   /* the result */
   rm_lid           *source, *target;
@@ -356,11 +366,9 @@ static rm_dd dd_quotient(rm_dd a, rm_dd b)
   return rm_quick_two_sum(q0, q1);
 }
 
-/* The point relative to o, its parameter computed again from the coordinates. */
-static void dd_relative(const rm_overlay *o, const point *p, const double origin[3], rm_dd out[3])
+/* lambda times the edge, the parameter computed again from the coordinates. */
+static void dd_delta(const rm_overlay *o, const point *p, rm_dd out[3])
 {
-  dd_difference(p->base, origin, out);
-  if (p->edge < 0) return;
   const rm_trimesh *own = o->mesh[p->mesh], *other = o->mesh[1 - p->mesh];
   const rm_lid     *v = other->triangle[p->triangle];
   const double     *t0 = other->vertex[v[0]];
@@ -371,12 +379,24 @@ static void dd_relative(const rm_overlay *o, const point *p, const double origin
   rm_dd_cross(a, b, n);
   dd_difference(own->vertex[own->edge[p->edge][1]], p->base, u);
   dd_difference(t0, p->base, down);
-  const rm_dd along = rm_dd_dot(n, u);
-  if (along.hi == 0) return; /* its limit is the edge's first vertex, as lambda has it */
-  rm_dd lambda = dd_quotient(rm_dd_dot(n, down), along);
+  const rm_dd along  = rm_dd_dot(n, u);
+  rm_dd       lambda = along.hi != 0 ? dd_quotient(rm_dd_dot(n, down), along) : (rm_dd){0, 0}; /* as lambda has it */
   if (lambda.hi < 0) lambda = (rm_dd){0, 0};
   if (lambda.hi > 1) lambda = (rm_dd){1, 0};
-  for (int c = 0; c < 3; c++) out[c] = rm_dd_add(out[c], rm_dd_mul(lambda, u[c]));
+  for (int c = 0; c < 3; c++) out[c] = rm_dd_mul(lambda, u[c]);
+}
+
+/* The point relative to an origin. A crossing serves several cones in a row: the last ones are remembered. */
+static void dd_relative(work *w, const point *p, const double origin[3], rm_dd out[3])
+{
+  dd_difference(p->base, origin, out);
+  if (p->edge < 0) return;
+  memo *m = &w->memo[((uint32_t)p->edge * 31u + (uint32_t)p->triangle) % NUM_MEMOS];
+  if (m->edge != p->edge || m->triangle != p->triangle || m->mesh != p->mesh) {
+    m->edge = p->edge, m->triangle = p->triangle, m->mesh = p->mesh;
+    dd_delta(w->o, p, m->delta);
+  }
+  for (int c = 0; c < 3; c++) out[c] = rm_dd_add(out[c], m->delta[c]);
 }
 
 static void add_cone_dd(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
@@ -387,8 +407,8 @@ static void add_cone_dd(work *w, rm_lid i, rm_lid j, int kind, double sign, cons
   (void)i, (void)kind;
   if (!(s->kinds & AGAIN)) return;
   dd_difference(pl->v, s->o, r);
-  dd_relative(w->o, p, s->o, a);
-  dd_relative(w->o, q, s->o, b);
+  dd_relative(w, p, s->o, a);
+  dd_relative(w, q, s->o, b);
   rm_dd_cross(a, b, cross);
   const rm_dd six_v = rm_dd_mul(rm_dd_dot(r, cross), (rm_dd){sign, 0});
   sum[0] = rm_dd_add(sum[0], six_v);
@@ -661,6 +681,8 @@ static remap_status file_pieces(work *w)
 static remap_status all_cells(work *w)
 {
   RM_TRY(file_pieces(w));
+  RM_NEW(w->memo, w->scratch, NUM_MEMOS);
+  for (int k = 0; k < NUM_MEMOS; k++) w->memo[k].edge = -1;
   RM_NEW(w->slot_of, w->scratch, w->o->mesh[1]->num_cells);
   for (rm_lid j = 0; j < w->o->mesh[1]->num_cells; j++) w->slot_of[j] = -1;
   for (rm_lid i = 0; i < w->o->mesh[0]->num_cells; i++) {
