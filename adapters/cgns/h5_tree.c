@@ -317,13 +317,11 @@ static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source
     status = rc_fail(w->message, RCGNS_IO, "%s: cannot list the children of node %s: is the file complete?", path_of(w, source),
                      rc_node_at(w->tree, me)->name);
   for (int64_t i = 0; i < list.name.count; i++) {
-    char      *name = ((char **)list.name.item)[i];
-    rc_node    n    = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
-    H5O_info_t info;
-    hid_t      child = -1;
+    char   *name  = ((char **)list.name.item)[i];
+    rc_node n     = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
+    hid_t   child = -1;
 
-    if (status == RCGNS_OK && strlen(name) < sizeof n.name && H5Oget_info_by_name1(group, name, &info, H5P_DEFAULT) >= 0 &&
-        info.type == H5O_TYPE_GROUP && (child = H5Gopen2(group, name, H5P_DEFAULT)) >= 0) {
+    if (status == RCGNS_OK && strlen(name) < sizeof n.name && (child = H5Gopen2(group, name, H5P_DEFAULT)) >= 0) {
       strcpy(n.name, name);
       status = walk(w, child, me, n, depth);
       H5Gclose(child);
