@@ -7,100 +7,11 @@
  * taken relative to O before anything is multiplied.
  *
  * Cost: four cones per segment and cell beside it, two per piece of an edge and triangle at it; 45 operations per cone. */
-#include "moments/moments.h"
+#include "moments/moments_private.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "geom/expansion.h"
-
-#if defined(__GNUC__)
-#define INLINE static inline __attribute__((always_inline))
-#else
-#define INLINE static inline
-#endif
-
-enum {
-  FROM_SOURCE = 1, /* the pair has pieces of edges of mesh 1 */
-  FROM_TARGET = 2, /* of mesh 2                              */
-  FROM_BOTH   = 4, /* it has segments                        */
-  SKIN_SOURCE = 8, /* one of its polygons lies in the skin of mesh 1 */
-  SKIN_TARGET = 16,
-  AGAIN       = 32 /* to be summed again in double-double    */
-};
-
-/* Sums of one pair: 6 V, 24 M, 120 S about o. */
-typedef struct slot {
-  rm_lid  target;
-  int32_t num_cones;
-  int     kinds;
-  int     first_polygon; /* of the pair in work.polygon, -1 */
-  double  o[3];
-  double  reach; /* largest extent of the meeting of the boxes */
-  double  sum[10];
-} slot;
-
-/* A side of a polygon ends in a vertex or in a crossing of an edge. */
-typedef struct point {
-  const double *base;     /* the edge's first vertex, or the vertex  */
-  double        delta[3]; /* from there; 0 for a vertex              */
-  int           mesh;     /* of the edge                             */
-  rm_lid        edge;     /* -1 for a vertex                         */
-  rm_lid        triangle; /* of the other mesh, crossed by the edge  */
-} point;
-
-/* The plane a polygon lies in. */
-typedef struct plane {
-  int           mesh;
-  rm_lid        triangle;
-  const double *n, *v;   /* normal, a vertex */
-  double        inverse; /* 1 / n.n, 0 for a triangle without area */
-} plane;
-
-/* One polygon of a pair, for the decision whether the pair has volume. */
-typedef struct polygon {
-  int     next; /* of the same pair, -1 */
-  int     mesh;
-  rm_lid  triangle;
-  int32_t num_cones;
-  double  area; /* twice, times the normal's magnitude, outward or not as the cones' signs say */
-  double  first[3]; /* one of its vertices, relative to the pair's origin */
-  double  reach;    /* largest distance of the others from it, by any one coordinate */
-} polygon;
-
-/* A crossing in double-double, relative to its edge's first vertex. */
-typedef struct memo {
-  int    mesh;
-  rm_lid edge, triangle;
-  rm_dd  delta[3];
-} memo;
-
-enum { NUM_MEMOS = 256 };
-
-typedef struct work {
-  const rm_part    *part;
-  const rm_overlay *o;
-  rm_arena         *scratch;
-  int               num_sums; /* 4 or 10 */
-  int64_t          *piece_offset; /* [cells of mesh 1 + 1] pieces of edges of mesh 2 in them */
-  rm_lid          (*piece)[2];    /* edge, number of the piece on it */
-  rm_lid           *slot_of;      /* [cells of mesh 2] -1 */
-  slot             *slots;
-  int64_t           slots_room;
-  int               num_slots;
-  polygon          *polygon;
-  int64_t           polygon_room;
-  int               num_polygons;
-  rm_dd           (*exact)[10]; /* [num_slots] sums of those marked AGAIN */
-  int64_t           exact_room;
-  memo             *memo; /* [NUM_MEMOS] */
-  remap_status      status;
-  /* the result */
-  rm_lid           *source, *target;
-  double           *volume, (*moment)[3], (*second)[6];
-  uint8_t          *flags;
-  int64_t           num_pairs, room[6];
-} work;
 
 /* ---- slots ------------------------------------------------------------------------------------------------------- */
 
@@ -126,13 +37,6 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
 INLINE slot *find_slot(work *w, rm_lid i, rm_lid j) { return w->slot_of[j] >= 0 ? &w->slots[w->slot_of[j]] : new_slot(w, i, j); }
 
 /* ---- what a cone adds --------------------------------------------------------------------------------------------- */
-
-typedef void sink(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q);
-
-INLINE void relative(const point *p, const double o[3], double out[3])
-{
-  for (int c = 0; c < 3; c++) out[c] = (p->base[c] - o[c]) + p->delta[c];
-}
 
 /* n.(p x q) for p and q relative to the slot's origin, and the plane's height over it times |n|. */
 INLINE double side_area(const slot *s, const plane *pl, const double p[3], const double q[3], double *height)
@@ -177,38 +81,6 @@ INLINE void add_cone(work *w, rm_lid i, rm_lid j, int kind, double sign, const p
 INLINE void add_cone_2(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
 {
   add_cone_of_degree(w, i, j, kind, sign, pl, p, q, true);
-}
-
-/* The polygon's area, for pairs that are in doubt. */
-static void add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
-{
-  slot         *s = &w->slots[w->slot_of[j]];
-  const double *n = pl->n;
-  double        a[3], b[3];
-  polygon      *g = NULL;
-
-  (void)i, (void)kind;
-  if (s->first_polygon == -1 || w->status != REMAP_OK) return;
-  for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next)
-    if (w->polygon[k].triangle == pl->triangle && w->polygon[k].mesh == pl->mesh) {
-      g = &w->polygon[k];
-      break;
-    }
-  relative(p, s->o, a);
-  relative(q, s->o, b);
-  if (!g) {
-    if ((w->status = rm_grow(&w->polygon, &w->polygon_room, w->num_polygons + 1, sizeof *w->polygon)) != REMAP_OK) return;
-    g  = &w->polygon[w->num_polygons];
-    *g = (polygon){s->first_polygon, pl->mesh, pl->triangle, 0, 0, {a[0], a[1], a[2]}, 0};
-    s->first_polygon = w->num_polygons++;
-  }
-  for (int c = 0; c < 3; c++) {
-    a[c] -= g->first[c];
-    b[c] -= g->first[c];
-    g->reach = fmax(g->reach, fmax(fabs(a[c]), fabs(b[c])));
-  }
-  g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
-  g->num_cones++;
 }
 
 /* ---- enumeration of the cones of cell i ---------------------------------------------------------------------------- */
@@ -422,152 +294,7 @@ static void add_cone_dd(work *w, rm_lid i, rm_lid j, int kind, double sign, cons
   }
 }
 
-/* ---- does a pair have volume, does a skin pass through it (DESIGN 2.6) ------------------------------------------------- */
-
-static double largest_extent(const double box[6])
-{
-  return fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-}
-
-/* Extent of what the pair's points are computed from: edges and faces of i, of j. */
-static double operand_extent(const work *w, rm_lid i, const slot *s)
-{
-  const double a = largest_extent(w->o->mesh[0]->cell_box[i]), b = largest_extent(w->o->mesh[1]->cell_box[s->target]);
-  return (s->kinds & (FROM_SOURCE | FROM_BOTH) ? a : 0) + (s->kinds & (FROM_TARGET | FROM_BOTH) ? b : 0) + s->reach;
-}
-
-/* Forward error of 6 V: in units of u = 2^-53, a point errs by 4 extents, a plane's height by 6, a cone's double area by 3 sqrt(3)
- * reach^2 at most: together less than 2^7 extent reach^2 per cone. */
-static double volume_noise(const work *w, rm_lid i, const slot *s)
-{
-  return 0x1p-46 * (s->num_cones + 1) * s->reach * s->reach * operand_extent(w, i, s);
-}
-
-/* The polygon has area beyond rounding: its points err by 4 extents, in units of u, however small it is itself. */
-static bool has_area(const work *w, rm_lid i, const slot *s, const polygon *g)
-{
-  const double *n = w->o->mesh[g->mesh]->normal[g->triangle];
-  const double  length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  return fabs(g->area) > 0x1p-46 * (g->num_cones + 1) * g->reach * operand_extent(w, i, s) * length;
-}
-
-static bool coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
-{
-  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
-  const rm_lid     *v = m->triangle[a];
-
-  for (int c = 0; c < 3; c++)
-    if (rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], k->vertex[k->triangle[b][c]]) != 0) return false;
-  return true;
-}
-
-/* +1 if the normals of triangles a and b out of their cells, cell[mesh], point the same way, -1 if opposite; for coplanar ones. */
-static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int mesh_b, rm_lid b)
-{
-  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
-  const double     *n = m->normal[a], *o = k->normal[b];
-  const bool        flip = (m->side[a][0] == cell[mesh_a]) != (k->side[b][0] == cell[mesh_b]);
-
-  return (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] > 0) != flip ? 1 : -1;
-}
-
-/* The polygons of the pair cancel: each one that has area meets an exactly coplanar one that has area and faces the other way. */
-static bool polygons_cancel(const work *w, rm_lid i, const slot *s)
-{
-  const rm_lid cell[2] = {i, s->target};
-
-  for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next) {
-    const polygon *g = &w->polygon[k];
-    bool           found = !has_area(w, i, s, g);
-
-    for (int l = s->first_polygon; l >= 0 && !found; l = w->polygon[l].next) {
-      const polygon *h = &w->polygon[l];
-      found = l != k && has_area(w, i, s, h) && coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle) &&
-              facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0;
-    }
-    if (!found) return false;
-  }
-  return true;
-}
-
-/* Area shared by triangles a and b projected along axis k, by clipping one at the sides of the other; computed relative to o. */
-static double shared_area(const double *const a[3], const double *const b[3], int k, const double o[3])
-{
-  const int x = (k + 1) % 3, y = (k + 2) % 3;
-  double    loop[2][8][2], area = 0;
-  int       n = 3, from = 0;
-  double    c[3][2];
-
-  for (int h = 0; h < 3; h++) {
-    loop[0][h][0] = a[h][x] - o[x], loop[0][h][1] = a[h][y] - o[y];
-    c[h][0] = b[h][x] - o[x], c[h][1] = b[h][y] - o[y];
-  }
-  const double turn = (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]) < 0 ? -1 : 1;
-  for (int h = 0; h < 3; h++, from = 1 - from) {
-    const double *p = c[h], u[2] = {c[(h + 1) % 3][0] - p[0], c[(h + 1) % 3][1] - p[1]};
-    double      (*in)[2] = loop[from], (*out)[2] = loop[1 - from];
-    int           m = 0;
-    for (int i = 0; i < n; i++) {
-      const double *q = in[i], *r = in[(i + 1) % n];
-      const double  s = turn * (u[0] * (q[1] - p[1]) - u[1] * (q[0] - p[0])), t = turn * (u[0] * (r[1] - p[1]) - u[1] * (r[0] - p[0]));
-      if (s >= 0) out[m][0] = q[0], out[m][1] = q[1], m++;
-      if ((s > 0 && t < 0) || (s < 0 && t > 0)) {
-        const double l = s / (s - t);
-        out[m][0] = q[0] + l * (r[0] - q[0]), out[m][1] = q[1] + l * (r[1] - q[1]), m++;
-      }
-    }
-    n = m;
-  }
-  for (int i = 1; i + 1 < n; i++)
-    area += (loop[from][i][0] - loop[from][0][0]) * (loop[from][i + 1][1] - loop[from][0][1]) -
-            (loop[from][i][1] - loop[from][0][1]) * (loop[from][i + 1][0] - loop[from][0][0]);
-  return fabs(area) / 2;
-}
-
-/* Simulation of simplicity puts triangle t of mesh `mesh` on the inner side of the coplanar triangle b of the other mesh's cell. */
-static bool is_just_inside(const work *w, const rm_lid cell[2], int mesh, rm_lid t, rm_lid b)
-{
-  const rm_trimesh *other = w->o->mesh[1 - mesh];
-  const rm_lid     *v     = other->triangle[b];
-  const int         side  = rm_point_side(other->vertex[v[0]], other->vertex[v[1]], other->vertex[v[2]],
-                                          w->o->mesh[mesh]->vertex[w->o->mesh[mesh]->triangle[t][0]], mesh ? -1 : 1, NULL);
-  return other->side[b][0] == cell[1 - mesh] ? side < 0 : side > 0;
-}
-
-/* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons there has area beyond what lies in
- * coplanar triangles of that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not make a cell
- * partial. Where they are put just outside the cell they are no polygons of it; where just inside, their area is taken off.) */
-static bool skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
-{
-  const rm_lid      cell[2] = {i, s->target};
-  const rm_trimesh *own = w->o->mesh[mesh], *other = w->o->mesh[1 - mesh];
-
-  for (int l = s->first_polygon; l >= 0; l = w->polygon[l].next) {
-    const polygon *g = &w->polygon[l];
-    const rm_lid   t = g->triangle;
-
-    if (g->mesh != mesh || !own->triangle_is_skin[t] || !has_area(w, i, s, g)) continue;
-    const double *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    const double *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
-    int           k    = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
-    if (fabs(n[2]) > fabs(n[k])) k = 2;
-    const double area = fabs(g->area) / 2 * fabs(n[k]) / square;
-    double       shared = 0;
-    for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1]; a++) {
-      const rm_lid b = other->cell_triangle[a] / 2;
-      if (!coplanar(w, mesh, t, 1 - mesh, b) || facing(w, cell, mesh, t, 1 - mesh, b) < 0) continue;
-      if (!is_just_inside(w, cell, mesh, t, b)) continue;
-      const double *c[3] = {other->vertex[other->triangle[b][0]], other->vertex[other->triangle[b][1]], other->vertex[other->triangle[b][2]]};
-      shared += shared_area(v, c, k, s->o);
-    }
-    if (shared == 0 || area - shared > 0x1p-40 * area) return true;
-  }
-  return false;
-}
-
 /* ---- one source cell ------------------------------------------------------------------------------------------------- */
-
-enum { NO_POLYGONS = -1, WANTS_POLYGONS = -2 };
 
 static remap_status push_pair(work *w, rm_lid i, const slot *s, uint8_t flags)
 {
@@ -610,8 +337,8 @@ static remap_status look_again(work *w, rm_lid i, bool sums, bool polygons)
         for (int c = 0; c < w->num_sums; c++) w->slots[k].sum[c] = w->exact[k][c].hi + w->exact[k][c].lo;
   }
   if (polygons) {
-    w->num_polygons = 0;
-    all_cones(w, i, add_polygon);
+    w->num_polygons = w->num_corners = 0;
+    all_cones(w, i, rm_moments_add_polygon);
   }
   return w->status;
 }
@@ -623,7 +350,7 @@ static remap_status finish_cell(work *w, rm_lid i)
 
   for (int k = 0; k < w->num_slots; k++) {
     slot        *s  = &w->slots[k];
-    const double vj = fabs(w->part->piece[1].cell_volume[s->target]), noise = volume_noise(w, i, s);
+    const double vj = fabs(w->part->piece[1].cell_volume[s->target]), noise = rm_moments_noise(w, i, s);
 
     if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
     if (fabs(s->sum[0]) <= noise || s->kinds & (SKIN_SOURCE | SKIN_TARGET)) s->first_polygon = WANTS_POLYGONS, polygons = true;
@@ -635,9 +362,9 @@ static remap_status finish_cell(work *w, rm_lid i)
 
     w->slot_of[s->target] = -1;
     if (s->first_polygon != NO_POLYGONS) {
-      if (fabs(s->sum[0]) <= volume_noise(w, i, s) && polygons_cancel(w, i, s)) continue;
-      if (s->kinds & SKIN_SOURCE && skin_passes(w, i, s, 0)) flags |= RM_PAIR_SOURCE_SKIN;
-      if (s->kinds & SKIN_TARGET && skin_passes(w, i, s, 1)) flags |= RM_PAIR_TARGET_SKIN;
+      if (fabs(s->sum[0]) <= rm_moments_noise(w, i, s) && !rm_moments_has_volume(w, i, s)) continue;
+      if (s->kinds & SKIN_SOURCE && rm_moments_skin_passes(w, i, s, 0)) flags |= RM_PAIR_SOURCE_SKIN;
+      if (s->kinds & SKIN_TARGET && rm_moments_skin_passes(w, i, s, 1)) flags |= RM_PAIR_TARGET_SKIN;
     }
     RM_TRY(push_pair(w, i, s, flags));
   }
@@ -728,6 +455,7 @@ remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_ove
   if (status == REMAP_OK) status = keep(arena, &w, out);
   free(w.slots);
   free(w.polygon);
+  free(w.corner);
   free(w.exact);
   free(w.source);
   free(w.target);
