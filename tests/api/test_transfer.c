@@ -96,7 +96,9 @@ static void check_promises(const tm_mesh *source, const tm_mesh *target, remap_f
     double             largest = 0, error = 0;
 
     for (int64_t c = 0; c < b.cells[0]; c++) one[c] = 1, largest = fmax(largest, fabs(lin[c]));
-    remap_field_desc fields[3] = {{"linear", REMAP_CONSERVED, 0, lin, got}, {"one", REMAP_CONSERVED, 0, one, got_one}, {"wave", REMAP_CONSERVED, 0, wave, got_wave}};
+    remap_field_desc fields[3] = {{.name = "linear", .nature = REMAP_CONSERVED, .in = lin, .out = got},
+                                  {.name = "one", .nature = REMAP_CONSERVED, .in = one, .out = got_one},
+                                  {.name = "wave", .nature = REMAP_CONSERVED, .in = wave, .out = got_wave}};
     RT_EQ(remap_get_stats(b.ctx, &stats), REMAP_OK);
     for (int side = 0; side < 2; side++)
       if (!RT_CHECK(stats.max_closure_error[side] <= 1e-12)) printf("# %s: closure of side %d: %g\n", what, side, stats.max_closure_error[side]);
@@ -160,10 +162,10 @@ static void remapping_onto_the_same_mesh_is_a_bitwise_copy(void)
         RT_EQ(remap_get_stats(b.ctx, &stats), REMAP_OK);
         if (!RT_EQ(stats.pairs, stats.cells[0])) printf("# %s, faces %d\n", kinds[s].name, faces);
         RT_EQ(stats.cells_by_cover[1][REMAP_COVERED], stats.cells[1]);
-        remap_field_desc field = {"wave", REMAP_CONSERVED, 0, u, got};
+        remap_field_desc field = {.name = "wave", .nature = REMAP_CONSERVED, .in = u, .out = got};
         RT_EQ(remap_field(b.ctx, REMAP_FORWARD, NULL, 1, &field, NULL), REMAP_OK);
         RT_CHECK(!memcmp(u, got, sizeof *u * (size_t)b.cells[0]));
-        field = (remap_field_desc){"wave", REMAP_CONSERVED, 0, got, u};
+        field = (remap_field_desc){.name = "wave", .nature = REMAP_CONSERVED, .in = got, .out = u};
         memset(u, 0, sizeof *u * (size_t)b.cells[0]);
         RT_EQ(remap_field(b.ctx, REMAP_BACKWARD, NULL, 1, &field, NULL), REMAP_OK);
         RT_CHECK(!memcmp(u, got, sizeof *u * (size_t)b.cells[0]));
@@ -178,7 +180,8 @@ static void remapping_onto_the_same_mesh_is_a_bitwise_copy(void)
 static void transfer_both_ways(bench *b, int64_t num_source, int64_t num_target, double *by_source, double *by_target)
 {
   double          *u = evaluate(b, 0, wavy), *v = tm_alloc_(b->cells[1], sizeof *v), *back = tm_alloc_(b->cells[0], sizeof *back);
-  remap_field_desc there = {"wave", REMAP_CONSERVED, 0, u, v}, home = {"wave", REMAP_CONSERVED, 0, v, back};
+  remap_field_desc there = {.name = "wave", .nature = REMAP_CONSERVED, .in = u, .out = v};
+  remap_field_desc home  = {.name = "wave", .nature = REMAP_CONSERVED, .in = v, .out = back};
 
   RT_EQ(remap_field(b->ctx, REMAP_FORWARD, NULL, 1, &there, NULL), REMAP_OK);
   RT_EQ(remap_field(b->ctx, REMAP_BACKWARD, NULL, 1, &home, NULL), REMAP_OK);

@@ -58,7 +58,7 @@ int main(int argc, char **argv)
     remap_get_stats(ctx, &stats);
     partition[r] = stats.seconds_partition;
     overlay[r]   = stats.seconds_overlay;
-    remap_field_desc one = {"u", REMAP_CONSERVED, 0, u, v};
+    remap_field_desc one = {.name = "u", .nature = REMAP_CONSERVED, .in = u, .out = v};
     status               = remap_field(ctx, REMAP_FORWARD, NULL, 1, &one, NULL); /* prepares the stencils */
     MPI_Barrier(MPI_COMM_WORLD);
     const double begin = MPI_Wtime();

@@ -24,29 +24,17 @@ static void open_job(job *j, tm_mesh *source, tm_mesh *target, tm_dealing deal)
   j->how    = (remap_transfer){2, REMAP_LIMITER_NONE, REMAP_UNCOVERED_KEEP, REMAP_PARTIAL_BLEND, -7.0};
   j->in     = rm_arena_alloc(j->w.arena, j->w.mesh[0]->num_cells, sizeof *j->in);
   j->out    = rm_arena_alloc(j->w.arena, j->w.mesh[1]->num_cells, sizeof *j->out);
-  j->field  = (remap_field_desc){"rho", REMAP_CONSERVED, 1, j->in, j->out};
+  j->field  = (remap_field_desc){.name = "rho", .nature = REMAP_CONSERVED, .has_old = 1, .in = j->in, .out = j->out};
   j->reason = (rm_reason){-1, -1, ""};
   for (rm_lid c = 0; c < j->w.mesh[0]->num_cells; c++) j->in[c] = 2.0;
   for (rm_lid c = 0; c < j->w.mesh[1]->num_cells; c++) j->out[c] = 10.0;
 }
 
-static rm_transfer_setup setup_of(const boxes_world *w)
-{
-  return (rm_transfer_setup){.comm              = &w->comm,
-                             .frame             = &w->frame,
-                             .giving            = w->mesh[0],
-                             .receiving         = w->mesh[1],
-                             .rows              = &w->mapping->rows[1],
-                             .giving_rows       = &w->mapping->rows[0],
-                             .giving_stencil    = w->stencil[0],
-                             .receiving_stencil = w->stencil[1]};
-}
-
 static remap_status run(job *j)
 {
-  const rm_transfer_setup setup  = setup_of(&j->w);
+  const rm_transfer_setup setup  = boxes_setup(&j->w, REMAP_FORWARD);
   rm_arena               *arena  = rm_arena_new();
-  const remap_status      status = rm_field_transfer(arena, &setup, &j->how, 1, &j->field, &j->report, &j->reason);
+  const remap_status      status = boxes_transfer(arena, &setup, &j->how, 1, &j->field, &j->report, &j->reason);
 
   rm_arena_drop(arena);
   return status;
@@ -367,14 +355,14 @@ static void memory_that_runs_out_on_one_rank_fails_on_all(void)
   j.how.on_uncovered = REMAP_UNCOVERED_NEAREST;
   while (status == REMAP_NO_MEMORY && n < 100) {
     const boxes_world      *w     = &j.w;
-    const rm_transfer_setup setup = setup_of(w);
+    const rm_transfer_setup setup = boxes_setup(w, REMAP_FORWARD);
     rm_arena               *arena = rm_arena_new();
     const rm_stencil       *stencil;
 
     n++;
     if (rt_rank() == rt_size() - 1) rm_arena_fail_at(arena, n);
     status = rm_stencil_build(arena, &w->comm, &w->frame, w->mesh[0], &stencil);
-    if (status == REMAP_OK) status = rm_field_transfer(arena, &setup, &j.how, 1, &j.field, &j.report, &j.reason);
+    if (status == REMAP_OK) status = boxes_transfer(arena, &setup, &j.how, 1, &j.field, &j.report, &j.reason);
     if (!rt_all(RT_CHECK(status == REMAP_NO_MEMORY || status == REMAP_OK))) n = 100;
     if (status != REMAP_OK)
       for (rm_lid c = 0; c < w->mesh[1]->num_cells; c++) RT_NEAR(j.out[c], 10.0, 0.0);

@@ -47,27 +47,13 @@ static double *values(const boxes_world *w, int side, field_of f)
   return u;
 }
 
-static rm_transfer_setup setup_of(const boxes_world *w, remap_direction direction)
-{
-  const int giving = direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET, receiving = 1 - giving;
-
-  return (rm_transfer_setup){&w->comm,
-                             &w->frame,
-                             w->mesh[giving],
-                             w->mesh[receiving],
-                             &w->mapping->rows[receiving],
-                             &w->mapping->rows[giving],
-                             w->stencil[giving],
-                             w->stencil[receiving]};
-}
-
 static remap_status transfer(const boxes_world *w, remap_direction direction, const remap_transfer *how, int num,
                              const remap_field_desc *fields, remap_field_report *reports)
 {
-  const rm_transfer_setup setup  = setup_of(w, direction);
+  const rm_transfer_setup setup  = boxes_setup(w, direction);
   rm_arena               *arena  = rm_arena_new();
   rm_reason               reason = {-1, -1, ""};
-  const remap_status      status = rm_field_transfer(arena, &setup, how, num, fields, reports, &reason);
+  const remap_status      status = boxes_transfer(arena, &setup, how, num, fields, reports, &reason);
 
   rm_arena_drop(arena);
   return status;
@@ -85,7 +71,7 @@ static double *move_field(const boxes_world *w, remap_direction direction, remap
 {
   const int              receiving = direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE;
   double                *out       = rm_arena_alloc(w->arena, w->mesh[receiving]->num_cells, sizeof *out);
-  const remap_field_desc field     = {"u", REMAP_CONSERVED, 0, in, out};
+  const remap_field_desc field     = {.name = "u", .nature = REMAP_CONSERVED, .in = in, .out = out};
 
   RT_EQ(transfer(w, direction, &how, 1, &field, report), REMAP_OK);
   return out;
@@ -293,7 +279,10 @@ static void move_many(boxes_world *w, remap_direction direction, remap_field_des
   how.on_uncovered = REMAP_UNCOVERED_KEEP;
   for (int f = 0; f < NUM_FIELDS; f++)
     field[f] =
-        (remap_field_desc){NULL, nature[f], f > 1, values(w, (int)direction, given[f]), values(w, 1 - (int)direction, old)};
+        (remap_field_desc){.nature  = nature[f],
+                           .has_old = f > 1,
+                           .in      = values(w, (int)direction, given[f]),
+                           .out     = values(w, 1 - (int)direction, old)};
   RT_EQ(transfer(w, direction, &how, NUM_FIELDS, field, report), REMAP_OK);
 }
 

@@ -223,6 +223,36 @@ static inline void boxes_close(boxes_world *world)
   rm_comm_free(&world->comm);
 }
 
+/* What a transfer between the world's meshes needs. */
+static inline rm_transfer_setup boxes_setup(const boxes_world *w, remap_direction direction)
+{
+  const int     giving = direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET, receiving = 1 - giving;
+  const rm_gid *number = w->mapping->cells_by_cover[receiving];
+
+  return (rm_transfer_setup){.comm              = &w->comm,
+                             .frame             = &w->frame,
+                             .giving            = w->mesh[giving],
+                             .receiving         = w->mesh[receiving],
+                             .rows              = &w->mapping->rows[receiving],
+                             .giving_rows       = &w->mapping->rows[giving],
+                             .giving_stencil    = w->stencil[giving],
+                             .receiving_stencil = w->stencil[receiving],
+                             .any_partial       = number[REMAP_PARTIAL] > 0,
+                             .any_uncovered     = number[REMAP_UNCOVERED] > 0};
+}
+
+/* One transfer with a carrier of its own, which lives in arena; integrals in the own frame. */
+static inline remap_status boxes_transfer(rm_arena *arena, const rm_transfer_setup *setup, const remap_transfer *how, int num,
+                                          const remap_field_desc *fields, remap_field_report *reports, rm_reason *reason)
+{
+  const rm_load load    = rm_load_of(setup, how, num, fields);
+  rm_carrier   *carrier = NULL;
+
+  RM_TRY(rm_carrier_build(arena, setup, load, &carrier, reason));
+  rm_carrier_start(carrier, how, num, fields, 1, REMAP_OK, reason);
+  return rm_carrier_finish(carrier, 1.0, reports, reason);
+}
+
 /* The cell of a mesh that has a global id; -1 if it is not on this rank. */
 static inline rm_lid boxes_find(const rm_mesh *mesh, rm_gid global)
 {

@@ -116,7 +116,8 @@ typedef enum remap_on_partial {
 typedef enum remap_cover {
   REMAP_UNCOVERED = 0, /**< no pair */
   REMAP_PARTIAL   = 1, /**< pairs, and a part outside of the other mesh */
-  REMAP_COVERED   = 2  /**< wholly inside the other mesh */
+  REMAP_COVERED   = 2, /**< wholly inside the other mesh */
+  REMAP_UNWANTED  = 3  /**< masked: it takes no part */
 } remap_cover;
 
 /** A context: one pair of meshes on one communicator. Opaque. */
@@ -176,6 +177,8 @@ typedef struct remap_field_desc {
   int           has_old; /**< not 0: out holds old values at entry, in every cell; the same on every rank */
   const double *in;      /**< [cells of the giving mesh on this rank] borrowed */
   double       *out;     /**< [cells of the receiving mesh on this rank] borrowed, written */
+  int64_t       in_stride, out_stride; /**< doubles from one cell's value to the next one's: n for interleaved q[c * n + k],
+                                            with in = q + k; 0 means 1 */
 } remap_field_desc;
 
 /** What a field's transfer did, over all ranks. */
@@ -246,17 +249,31 @@ REMAP_API remap_status remap_set_mesh(remap_context *ctx, remap_side side, const
  *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
 REMAP_API remap_status remap_build(remap_context *ctx);
 
-/** Transfer num_fields cell fields. Collective. All of transfer, num_fields, names and natures agree on all ranks.
- *  reports, if not NULL, is [num_fields] and gets the same content on every rank.
+/** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on all of
+ *  them. The first call in a direction after a build, and one that asks for more than those before (more fields, order 2, bounds,
+ *  nearest cells), prepares it: it is collective. So is a call with reports, [num_fields] on every rank or NULL on every rank, which
+ *  get the same content everywhere. Any other call exchanges messages with neighbours only and takes no memory: its status is
+ *  the worst of this rank's own and of those neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes
+ *  it one. Values below 1e-280 count as 0.
  *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value), COVERAGE, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
                                    const remap_field_desc *fields, remap_field_report *reports);
 
+/** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them and
+ *  sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes. fields and
+ *  transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change. One transfer in
+ *  each direction may be under way; all ranks start and finish in the same order, and none builds, moves or masks in between.
+ *  A start that fails does so on all ranks alike and leaves nothing under way; what is wrong with this rank's own values is
+ *  told by the finish. Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
+REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
+                                         int num_fields, const remap_field_desc *fields);
+REMAP_API remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports);
+
 /** The greatest of the ranks' statuses, for callers who want their own failures to be shared. Collective. */
 REMAP_API remap_status remap_agree(remap_context *ctx, remap_status mine);
 
-/** The text that belongs to the last failure: names the mesh, zone and cell, and what to do. The same on every rank; empty
- *  if nothing failed. Owned by the context, valid until its next call. Not collective. */
+/** The text that belongs to the last failure: names the mesh, zone and cell, and what to do. The same on every rank after a
+ *  collective failure; empty if nothing failed. Owned by the context, valid until its next call. Not collective. */
 REMAP_API const char *remap_message(const remap_context *ctx);
 
 /** Statistics of the last remap_build. Not collective. Errors: BAD_ORDER. */

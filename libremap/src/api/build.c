@@ -174,6 +174,12 @@ remap_status remap_build(remap_context *ctx)
   remap_status status;
 
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  if (rm_context_is_busy(ctx)) {
+    rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
+    rm_context_explain(ctx, REMAP_BAD_ORDER, &reason);
+    return REMAP_BAD_ORDER;
+  }
+  rm_context_drop_carriers(ctx);
   rm_arena_drop(ctx->arena);
   ctx->arena    = rm_arena_new();
   passing       = rm_arena_new();

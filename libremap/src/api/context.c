@@ -108,6 +108,7 @@ const char *remap_message(const remap_context *ctx) { return ctx ? ctx->message 
 void remap_destroy(remap_context **ctx)
 {
   if (!ctx || !*ctx) return;
+  rm_context_drop_carriers(*ctx);
   rm_arena_drop((*ctx)->arena);
   rm_comm_free(&(*ctx)->comm);
   free(*ctx);

@@ -27,11 +27,20 @@ struct remap_context {
   const rm_mesh    *mesh[2];
   const rm_mapping *mapping;
   const rm_stencil *stencil[2]; /* made when first needed */
+  rm_arena         *carrier_arena[2]; /* [direction] of the carrier alone, which is made anew when more has to fit in */
+  rm_carrier       *carrier[2];       /* [direction] NULL until needed                                                */
+  rm_load           load[2];          /* [direction] that the carrier is made for                                     */
   remap_pairs_view  view[2];    /* likewise; row_offset NULL until then */
   remap_stats       stats;
 };
 
 /* Put what *reason says about a failure into the context's message, with mesh, zone and cell by name. Not collective. */
 void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason);
+
+/* Is a transfer under way in either direction? */
+bool rm_context_is_busy(const remap_context *ctx);
+
+/* Give up transfers under way, and drop what they kept. On all ranks; waits for neighbours at most. */
+void rm_context_drop_carriers(remap_context *ctx);
 
 #endif

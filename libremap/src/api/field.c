@@ -1,16 +1,18 @@
-/* field -- remap_field: checks the arguments on every rank, then hands over to room field. */
-#include <stdlib.h>
-#include <string.h>
+/* field -- remap_field and its halves. What a transfer needs is prepared when it is first asked for, by all ranks together; after
+ * that a transfer involves neighbours only and takes no memory. */
 #include "api/context.h"
 
-static remap_status check_arguments(const remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
-                                    const remap_field_desc *fields, rm_reason *reason)
-{
-  const remap_side giving = direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET, receiving = 1 - giving;
+static remap_side giver_of(remap_direction direction) { return direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET; }
 
-  if (!ctx->is_built) return rm_fail(REMAP_BAD_ORDER, reason, -1, -1, "remap_field needs a successful remap_build");
+/* What all ranks pass alike. */
+static remap_status check_agreed(const remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
+                                 const remap_field_desc *fields, rm_reason *reason)
+{
+  if (!ctx->is_built) return rm_fail(REMAP_BAD_ORDER, reason, -1, -1, "a transfer needs a successful remap_build");
   if (direction != REMAP_FORWARD && direction != REMAP_BACKWARD)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "direction is %d, neither forward nor backward", (int)direction);
+  if (rm_carrier_is_under_way(ctx->carrier[direction]))
+    return rm_fail(REMAP_BAD_ORDER, reason, -1, -1, "a transfer in this direction is under way: remap_field_finish comes first");
   if (how->order < 1 || how->order > ctx->options.max_order)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "order %d is not within 1..%d, the context's max_order", how->order,
                    ctx->options.max_order);
@@ -19,86 +21,166 @@ static remap_status check_arguments(const remap_context *ctx, remap_direction di
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "the limiter or a coverage policy is not one of its enum");
   if (num_fields < 0 || (num_fields > 0 && !fields))
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "num_fields is %d, fields is %s", num_fields, fields ? "given" : "NULL");
+  for (int k = 0; k < num_fields; k++)
+    if (fields[k].nature < REMAP_CONSERVED || fields[k].nature > REMAP_FLAG)
+      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: nature %d is not one of its enum",
+                     fields[k].name ? fields[k].name : "?", (int)fields[k].nature);
+  return REMAP_OK;
+}
+
+/* What this rank alone passes. */
+static remap_status check_own(const remap_context *ctx, remap_direction direction, int num_fields, const remap_field_desc *fields,
+                              rm_reason *reason)
+{
+  const remap_side giving = giver_of(direction);
+  const bool       gives = ctx->mesh[giving]->num_cells > 0, receives = ctx->mesh[1 - giving]->num_cells > 0;
+
   for (int k = 0; k < num_fields; k++) {
     const remap_field_desc *f = &fields[k];
-    if (f->nature < REMAP_CONSERVED || f->nature > REMAP_FLAG)
-      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: nature %d is not one of its enum", f->name ? f->name : "?", (int)f->nature);
-    if ((!f->in && ctx->mesh[giving]->num_cells) || (!f->out && ctx->mesh[receiving]->num_cells))
-      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: in or out is NULL on a rank that has cells", f->name ? f->name : "?");
+
+    if ((!f->in && gives) || (!f->out && receives))
+      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: in or out is NULL on a rank that has cells",
+                     f->name ? f->name : "?");
+    if (f->in_stride < 0 || f->out_stride < 0)
+      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: strides are not negative", f->name ? f->name : "?");
   }
   return REMAP_OK;
 }
 
-/* The same transfer on every rank? Compared by a hash and its complement. Collective. */
-static remap_status check_agreement(const remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
-                                    const remap_field_desc *fields, rm_reason *reason)
+/* A number that tells this transfer from others that ranks might mistake for it. */
+static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
 {
   const int words[6] = {(int)direction, how->order, (int)how->limiter, (int)how->on_uncovered, (int)how->on_partial, num_fields};
-  uint64_t  hash = 0;
+  uint64_t  hash     = 0;
 
   for (int k = 0; k < 6; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
   for (int k = 0; k < num_fields; k++) hash = rm_hash_word(hash ^ ((uint64_t)fields[k].nature << 1 | (fields[k].has_old != 0)));
-  int64_t extreme[2] = {(int64_t)(hash >> 2), -(int64_t)(hash >> 2)};
+  return hash;
+}
+
+/* The same transfer on every rank? Compared by its mark and the complement. Collective. */
+static remap_status check_marks(const remap_context *ctx, uint64_t mark, rm_reason *reason)
+{
+  int64_t extreme[2] = {(int64_t)(mark >> 2), -(int64_t)(mark >> 2)};
+
   RM_TRY(rm_comm_max_i64(&ctx->comm, extreme, 2));
   return extreme[0] == -extreme[1] ? REMAP_OK
                                    : rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1,
                                              "direction, transfer, number, natures or old values of fields differ between ranks");
 }
 
-static remap_status need_stencils(remap_context *ctx, remap_side giving, const remap_transfer *how)
+static rm_transfer_setup setup_of(const remap_context *ctx, remap_direction direction)
 {
-  const bool needed[2] = {giving == REMAP_SOURCE ? how->order > 1 : true, giving == REMAP_TARGET ? how->order > 1 : true};
+  const remap_side giving = giver_of(direction), receiving = 1 - giving;
+
+  return (rm_transfer_setup){.comm              = &ctx->comm,
+                             .frame             = &ctx->frame,
+                             .giving            = ctx->mesh[giving],
+                             .receiving         = ctx->mesh[receiving],
+                             .rows              = &ctx->mapping->rows[receiving],
+                             .giving_rows       = &ctx->mapping->rows[giving],
+                             .giving_stencil    = ctx->stencil[giving],
+                             .receiving_stencil = ctx->stencil[receiving],
+                             .any_partial       = ctx->mapping->cells_by_cover[receiving][REMAP_PARTIAL] > 0,
+                             .any_uncovered     = ctx->mapping->cells_by_cover[receiving][REMAP_UNCOVERED] > 0};
+}
+
+/* Make the carrier that a load needs, and what it rests on. Collective. */
+static remap_status prepare(remap_context *ctx, remap_direction direction, rm_load load, rm_reason *reason)
+{
+  const remap_side giving    = giver_of(direction);
+  const bool       needed[2] = {giving == REMAP_SOURCE ? load.has_slopes : load.has_nearest,
+                                giving == REMAP_TARGET ? load.has_slopes : load.has_nearest};
 
   for (int side = 0; side < 2; side++)
     if (needed[side] && !ctx->stencil[side])
       RM_TRY(rm_stencil_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh[side], &ctx->stencil[side]));
+  if (ctx->carrier[direction]) load = rm_load_max(load, ctx->load[direction]);
+  rm_arena_drop(ctx->carrier_arena[direction]);
+  ctx->carrier[direction]       = NULL;
+  ctx->carrier_arena[direction] = rm_arena_new();
+  RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  const rm_transfer_setup setup = setup_of(ctx, direction);
+  RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));
+  ctx->load[direction] = load;
   return REMAP_OK;
 }
 
-static remap_status transfer(remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
-                             const remap_field_desc *fields, remap_field_report *reports, rm_arena *arena, rm_reason *reason)
+static remap_status start(remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
+                          const remap_field_desc *fields, rm_reason *reason)
 {
-  const remap_side giving = direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET, receiving = 1 - giving;
-  const double     unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+  remap_status mine;
 
-  RM_TRY(check_agreement(ctx, direction, how, num_fields, fields, reason));
-  RM_TRY(need_stencils(ctx, giving, how));
-  const rm_transfer_setup setup = {&ctx->comm,
-                                   &ctx->frame,
-                                   ctx->mesh[giving],
-                                   ctx->mesh[receiving],
-                                   &ctx->mapping->rows[receiving],
-                                   &ctx->mapping->rows[giving],
-                                   how->order > 1 ? ctx->stencil[giving] : NULL,
-                                   ctx->stencil[receiving]};
-  RM_TRY(rm_field_transfer(arena, &setup, how, num_fields, fields, reports, reason));
-  for (int k = 0; reports && k < num_fields; k++) {
-    reports[k].source_integral *= cubed;
-    reports[k].target_integral *= cubed;
+  RM_TRY(check_agreed(ctx, direction, how, num_fields, fields, reason));
+  const rm_transfer_setup setup = setup_of(ctx, direction);
+  const rm_load           load  = rm_load_of(&setup, how, num_fields, fields);
+  const uint64_t          mark  = mark_of(direction, how, num_fields, fields);
+  mine = check_own(ctx, direction, num_fields, fields, reason);
+  if (!ctx->carrier[direction] || !rm_load_covers(ctx->load[direction], load)) {
+    RM_TRY(rm_comm_agree_reason(&ctx->comm, mine, reason));
+    RM_TRY(check_marks(ctx, mark, reason));
+    RM_TRY(prepare(ctx, direction, load, reason));
   }
+  rm_carrier_start(ctx->carrier[direction], how, num_fields, fields, mark, mine, reason);
   return REMAP_OK;
 }
 
-remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer_given, int num_fields,
-                         const remap_field_desc *fields, remap_field_report *reports)
+remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                               const remap_field_desc *fields)
 {
   rm_reason      reason = {-1, -1, ""};
   remap_transfer how;
-  rm_arena      *arena;
   remap_status   status;
-  const double   start = rm_seconds();
+  const double   begin = rm_seconds();
 
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
   remap_transfer_default(&how);
-  if (transfer_given) how = *transfer_given;
-  arena  = rm_arena_new();
-  status = check_arguments(ctx, direction, &how, num_fields, fields, &reason);
-  if (status == REMAP_OK && !arena) status = REMAP_NO_MEMORY;
-  status = rm_comm_agree_reason(&ctx->comm, status, &reason);
-  if (status == REMAP_OK) status = transfer(ctx, direction, &how, num_fields, fields, reports, arena, &reason);
-  rm_arena_drop(arena);
+  if (transfer) how = *transfer;
+  status = start(ctx, direction, &how, num_fields, fields, &reason);
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
-  ctx->seconds_transfer += rm_seconds() - start;
+  ctx->seconds_transfer += rm_seconds() - begin;
   return status;
+}
+
+remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports)
+{
+  rm_reason    reason = {-1, -1, ""};
+  remap_status status;
+  const double begin = rm_seconds();
+
+  RM_REQUIRE(ctx && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
+  ctx->message[0] = '\0';
+  if (!rm_carrier_is_under_way(ctx->carrier[direction])) {
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "no transfer in this direction is under way: remap_field_start comes first");
+  } else {
+    const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+
+    status = rm_carrier_finish(ctx->carrier[direction], cubed, reports, &reason);
+  }
+  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
+  ctx->seconds_transfer += rm_seconds() - begin;
+  return status;
+}
+
+remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                         const remap_field_desc *fields, remap_field_report *reports)
+{
+  RM_TRY(remap_field_start(ctx, direction, transfer, num_fields, fields));
+  return remap_field_finish(ctx, direction, reports);
+}
+
+bool rm_context_is_busy(const remap_context *ctx)
+{
+  return rm_carrier_is_under_way(ctx->carrier[0]) || rm_carrier_is_under_way(ctx->carrier[1]);
+}
+
+void rm_context_drop_carriers(remap_context *ctx)
+{
+  for (int d = 0; d < 2; d++) {
+    rm_carrier_abandon(ctx->carrier[d]);
+    rm_arena_drop(ctx->carrier_arena[d]);
+    ctx->carrier[d]       = NULL;
+    ctx->carrier_arena[d] = NULL;
+  }
 }

@@ -55,4 +55,32 @@ remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_wan
  * send_offset[num_send] items. Among neighbours only: returns as soon as this rank has sent and received. */
 remap_status rm_plan_run(const rm_comm *comm, const rm_plan *plan, size_t size, const void *item, void *received, void *buffer);
 
+/* What a rank tells its neighbours in front of its items. */
+typedef struct rm_note {
+  uint64_t mark;   /* says what is under way: the same at sender and receiver, if they agree */
+  int64_t  status; /* remap_status of the sender                                             */
+} rm_note;
+
+/* flow -- a plan run in two steps, so that other work fits between, with a note in front of every message. Its memory is taken
+ * once. rm_flow_post and rm_flow_wait involve neighbours only and take turns; a rank that failed posts all the same and says so
+ * in its note, so nobody waits for ever. */
+typedef struct rm_flow {
+  const rm_plan *plan;
+  size_t         most;     /* bytes per item that there is room for                                        */
+  size_t         size;     /* bytes per item of the run under way                                          */
+  char          *sent;     /* messages to others side by side, each a note and items                       */
+  char          *arrived;  /* messages from others likewise                                                */
+  char          *received; /* [plan->recv_offset[plan->num_recv]] items of the last run, in the plan's order */
+  MPI_Request   *request;
+  int            num_requests; /* under way */
+} rm_flow;
+
+/* Room for runs of at most `most` bytes per item. Not collective. Lives in arena. NO_MEMORY. */
+remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_flow *out);
+/* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards. */
+remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const void *item, rm_note note);
+/* Wait until this rank has received and sent; flow->received then holds the items. The status in note becomes the greatest of its
+ * own and the senders'. BAD_ARGUMENT if a sender's mark differs. */
+remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_note *note);
+
 #endif

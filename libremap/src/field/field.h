@@ -30,16 +30,55 @@ typedef struct rm_transfer_setup {
   const rm_comm    *comm;
   const rm_frame   *frame;
   const rm_mesh    *giving, *receiving;
-  const rm_rows    *rows;           /* of the receiving cells                                     */
-  const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals */
-  const rm_stencil *giving_stencil; /* NULL if order 1                                            */
-  const rm_stencil *receiving_stencil; /* for nearest by layers                                   */
+  const rm_rows    *rows;           /* of the receiving cells                                        */
+  const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals  */
+  const rm_stencil *giving_stencil; /* NULL if order 1                                               */
+  const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
+  const rm_lid     *giving_place;   /* [giving cells] where a cell's values stand in the caller's arrays, NULL: at its number */
+  const rm_lid     *receiving_place; /* [receiving cells] likewise                                   */
+  bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 
-/* Transfer num_fields fields; see remap_field in remap.h for the arguments. Collective. Results depend neither on partition nor on
- * numbering. reports may be NULL on some ranks or all; their integrals are over volumes of the own frame. Old values are
- * read only where a policy keeps them. Scratch memory lives in arena (the caller drops it). */
-remap_status rm_field_transfer(rm_arena *arena, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
-                               const remap_field_desc *fields, remap_field_report *reports, rm_reason *reason);
+/* How much a transfer asks of a carrier; the same on every rank. */
+typedef struct rm_load {
+  int  num_fields;
+  int  width;       /* doubles that travel per giving cell           */
+  bool has_slopes;  /* needs the stencil's halo                       */
+  bool has_nearest; /* uncovered cells take the nearest mapped cell's */
+} rm_load;
+
+/* The load of a transfer. Not collective. */
+rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
+/* A load that covers both, and whether the first covers the second. */
+rm_load rm_load_max(rm_load a, rm_load b);
+bool rm_load_covers(rm_load a, rm_load b);
+
+/* carrier -- takes fields from the giving to the receiving cells, again and again, without taking memory and among neighbours
+ * only. It holds buffers and what is under way, but nothing that changes a result: results depend neither on partition nor on
+ * numbering, nor on earlier transfers. */
+typedef struct rm_carrier rm_carrier;
+
+/* A carrier for transfers up to a load. Collective. Lives in arena; setup is copied, what it points to is borrowed. COVERAGE if
+ * cells look for the nearest mapped cell and there is none. */
+remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out, rm_reason *reason);
+
+/* Read values, check them and send what neighbours wait for. All ranks start, but none waits. mark tells this transfer from
+ * others. A failure here is kept: rm_carrier_finish hands it out, once neighbours know; so is one that the caller comes with, mine
+ * and its reason: then no value is read. The load fits; none is under way. how and fields are copied; of the arrays, only `out` is
+ * borrowed until the finish, which writes it. */
+void rm_carrier_start(rm_carrier *carrier, const remap_transfer *how, int num_fields, const remap_field_desc *fields, uint64_t mark,
+                      remap_status mine, const rm_reason *reason);
+
+/* Complete what was started. All ranks finish; each waits for its neighbours only, and its status is the worst of its own and
+ * of those whose values it uses. With reports, [num_fields] on every rank or NULL on every rank, it is collective and the status
+ * the same everywhere. Fields are written if the status is OK. cubed: the caller's unit of volume in that of the own frame, for
+ * the integrals of the reports. */
+remap_status rm_carrier_finish(rm_carrier *carrier, double cubed, remap_field_report *reports, rm_reason *reason);
+
+/* Is a transfer under way? carrier may be NULL here and below. */
+bool rm_carrier_is_under_way(const rm_carrier *carrier);
+
+/* Give up what is under way, if anything, on all ranks; each waits for the neighbours' starts only. */
+void rm_carrier_abandon(rm_carrier *carrier);
 
 #endif

@@ -2,7 +2,8 @@
  *
  *   stencil         vertex neighbours and their weights              leastsq   the weights of one cell
  *   reconstruct     giving cells: value, slope, bounds               nearest   where uncovered cells look
- *   transfer        receiving cells, coverage policies, in order     integral  what was kept, exactly */
+ *   receive         receiving cells, coverage policies               integral  what was kept, exactly
+ *   carrier         all of it in order, in two steps                                                      */
 #ifndef RM_FIELD_PRIVATE_H
 #define RM_FIELD_PRIVATE_H
 
@@ -24,23 +25,27 @@ void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *nois
 
 /* ---- reconstruct ----------------------------------------------------------------------------------------------- */
 
+/* Sums and slopes are of values times this power of two, so that differences of the largest values and slopes over small cells
+ * stay finite. It changes no digit of what is not below 1e-280. */
+#define RM_VALUE_SCALE 0x1p-64
+
 /* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it (at
  * order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own alone); where the field has
  * slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled. */
 typedef struct rm_packing {
-  int           width;
-  int          *at;         /* [num_fields]                                                                  */
-  int          *order;      /* [num_fields] 1 or 2                                                           */
-  const double *scale;      /* [num_fields] powers of two that bring the field's values far from overflow    */
-  bool          has_bounds; /* fields of order 2 carry the bounds                                            */
-  bool          is_limited; /* Barth-Jespersen                                                               */
+  int  num_fields, width;
+  int *at;         /* [num_fields]                           */
+  int *order;      /* [num_fields] 1 or 2                    */
+  bool has_bounds; /* fields of order 2 carry the bounds     */
+  bool is_limited; /* Barth-Jespersen                        */
 } rm_packing;
 enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
 
-/* Fill pack [giving cells][width] and limited [num_fields], the number of cells whose slope was reduced on this rank. Cells that
- * cover nothing get slope 0. Collective. */
-remap_status rm_reconstruct(rm_arena *arena, const rm_transfer_setup *setup, int num_fields, const remap_field_desc *fields,
-                            const rm_packing *packing, double *pack, int64_t *limited);
+/* Fill the pack, [giving cells][width], of cells whose needs_halo is `which`; limited [num_fields] grows by the number of cells
+ * whose slope was reduced. given is [giving cells][num_fields], halo [halo of the stencil][num_fields], read only for cells that
+ * need it. Cells that cover nothing get slope 0. Not collective. */
+void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, const double *given, const double *halo,
+                    const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited);
 
 /* ---- nearest --------------------------------------------------------------------------------------------------- */
 
@@ -93,12 +98,31 @@ static inline void rm_integral_add(rm_sum *sum, double x, double y)
 }
 
 /* Add what the giving cells hold to source and magnitude of integral [num_fields]; flags are left out. Not collective. */
-void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const remap_field_desc *fields, const rm_packing *packing,
-                        const double *pack, rm_integral *integral);
+void rm_integral_source(const rm_transfer_setup *setup, const remap_field_desc *fields, const rm_packing *packing,
+                        const double *given, const double *pack, rm_integral *integral);
 
-/* Reduce over all ranks and fill in the integrals of reports [num_fields], if this rank wants them. Collective. Working memory
- * from scratch. */
-remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_packing *packing,
-                                rm_integral *integral, remap_field_report *reports);
+/* Reduce over all ranks and fill in the integrals of reports [num_fields]. Collective. Working memory from scratch. */
+remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_integral *integral,
+                                remap_field_report *reports);
+
+/* ---- receive --------------------------------------------------------------------------------------------------- */
+
+/* One transfer on the receiving side. */
+typedef struct rm_receipt {
+  const rm_transfer_setup *setup;
+  const remap_transfer    *how;
+  const remap_field_desc  *fields;   /* [packing->num_fields]                                     */
+  const rm_packing        *packing;
+  const double            *got;      /* [givers of the rows][width]                               */
+  double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
+  rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */
+} rm_receipt;
+
+/* Is a receiving cell's old value used? */
+bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover);
+/* Do uncovered cells take the nearest value of this field? */
+bool rm_needs_nearest(const remap_transfer *how, const remap_field_desc *field);
+/* The new value of every cell that wants one, but for those that take the nearest. Not collective. O(pairs) per field. */
+void rm_receive(const rm_receipt *receipt);
 
 #endif

@@ -17,17 +17,18 @@ static void add_partial(const rm_rows *rows, rm_lid cell, const double centroid[
   }
 }
 
-void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const remap_field_desc *fields,
-                        const rm_packing *packing, const double *pack, rm_integral *integral)
+void rm_integral_source(const rm_transfer_setup *setup, const remap_field_desc *fields, const rm_packing *packing,
+                        const double *given, const double *pack, rm_integral *integral)
 {
   const rm_rows *rows = setup->giving_rows;
   const rm_mesh *mesh = setup->giving;
+  const int      num  = packing->num_fields;
 
-  for (int f = 0; f < num_fields; f++) {
+  for (int f = 0; f < num; f++) {
     if (fields[f].nature == REMAP_FLAG) continue;
     for (rm_lid c = 0; c < mesh->num_cells; c++) {
       const double *place  = pack + (int64_t)c * packing->width + packing->at[f];
-      const double  value  = packing->scale[f] * fields[f].in[c];
+      const double  value  = RM_VALUE_SCALE * given[(int64_t)c * num + f];
       const double *slope  = packing->order[f] > 1 ? place + RM_PACK_SLOPE : NULL;
       const double  volume = mesh->cell_volume[c];
 
@@ -41,8 +42,8 @@ void rm_integral_source(const rm_transfer_setup *setup, int num_fields, const re
   }
 }
 
-remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_packing *packing,
-                                rm_integral *integral, remap_field_report *reports)
+remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_integral *integral,
+                                remap_field_report *reports)
 {
   const int n   = num_fields;
   rm_sum   *sum = rm_arena_alloc(scratch, 3 * (int64_t)n, sizeof *sum);
@@ -55,12 +56,11 @@ remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setu
     sum[2 * n + f] = integral[f].magnitude;
   }
   RM_TRY(rm_comm_sum_exact(setup->comm, sum, 3 * n));
-  for (int f = 0; f < n && reports; f++) {
+  for (int f = 0; f < n; f++) {
     const double magnitude = rm_sum_value(&sum[2 * n + f]);
-    const double scale     = packing->scale[f];
 
-    reports[f].source_integral = rm_sum_value(&sum[f]) / scale;
-    reports[f].target_integral = (0.0 - rm_sum_value(&sum[n + f])) / scale;
+    reports[f].source_integral = rm_sum_value(&sum[f]) / RM_VALUE_SCALE;
+    reports[f].target_integral = (0.0 - rm_sum_value(&sum[n + f])) / RM_VALUE_SCALE;
     rm_sum_merge(&sum[f], &sum[n + f]);
     reports[f].conservation_error = magnitude > 0.0 ? fabs(rm_sum_value(&sum[f])) / magnitude : 0.0;
   }

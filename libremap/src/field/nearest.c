@@ -141,10 +141,12 @@ remap_status rm_nearest_build(rm_arena *arena, const rm_comm *comm, const rm_mes
   nearest->cell   = cell;
   nearest->origin = origin;
   for (int64_t k = 0; k < num_waiting; k++) cell[k] = waiting[k];
-  for (rm_lid c = 0; c < mesh->num_cells; c++)
-    if (cover[c] != REMAP_UNCOVERED) own[c].rank = comm->rank;
-
-  most[0] = mesh->num_cells - num_waiting; /* mapped cells */
+  most[0] = 0; /* mapped cells */
+  for (rm_lid c = 0; c < mesh->num_cells; c++) {
+    if (!rm_is_mapped(cover[c])) continue;
+    own[c].rank = comm->rank;
+    most[0]++;
+  }
   RM_GOTO(done, status = rm_comm_max_i64(comm, most, 1));
   if (most[0] == 0) {
     status = rm_fail(REMAP_COVERAGE, reason, mesh->side, -1, "no cell meets the other mesh: are units and position alike?");

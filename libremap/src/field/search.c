@@ -94,7 +94,7 @@ static remap_status build_tree(rm_arena *scratch, const rm_comm *comm, const rm_
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
     const double *x = mesh->cell_centroid[c];
 
-    if (cover[c] == REMAP_UNCOVERED) continue;
+    if (!rm_is_mapped(cover[c])) continue;
     t->point[t->num++] = (tree_point){{x[0], x[1], x[2]}, c, 0};
     for (int d = 0; d < 3; d++) {
       t->box[d]     = fmin(t->box[d], x[d]);

@@ -7,6 +7,9 @@
 
 #include <math.h>
 
+/* Has a cell of this coverage pairs? */
+static inline bool rm_is_mapped(uint8_t cover) { return cover == REMAP_PARTIAL || cover == REMAP_COVERED; }
+
 /* The pairs of the cells of one side (the receiving cells), on the rank that handed them in. Read-only once built. Invariants:
  *   a row's pairs ascend by the giving cell's (Morton key of the centroid, centroid, volume, global id);
  *   giver[] points into the halo lists; each (rank, cell) is listed once there, ascending;

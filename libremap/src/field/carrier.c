@@ -1,0 +1,418 @@
+/* carrier -- fields from giving to receiving cells, in two steps.
+ *
+ *   start    values are gathered and checked; those of the stencil's halo travel (order 2), or all that is given (order 1)
+ *   finish   slopes of the giving cells; what is given travels; cells receive; uncovered cells take the nearest value, where
+ *            there are any; exact integrals, where somebody wants them; values are written
+ *
+ * Every message carries its sender's status, so a failure reaches all who depend on it, in the exchange that follows. The caller's
+ * arrays are written at the very end, when nothing can fail any more. O(pairs) time per field; 16 bytes per receiving cell, and
+ * 16 to 56 per giving cell, for each field. */
+#include "field_private.h"
+
+#include <stdio.h>
+
+struct rm_carrier {
+  rm_transfer_setup setup;
+  rm_load           load;       /* the most it can carry                                       */
+  rm_flow           halo;       /* values around the giving cells' stencils                     */
+  rm_flow           given_flow; /* what giving cells give                                       */
+  rm_flow           taken;      /* values that uncovered cells take                             */
+  const rm_nearest *nearest;    /* NULL: nobody takes any                                       */
+  uint8_t          *needs_halo; /* [giving cells] 1: its stencil reaches other ranks             */
+  double           *given;      /* [giving cells][num_fields] as the caller gave them            */
+  double           *pack;       /* [giving cells][width]                                        */
+  double           *value;      /* [receiving cells][num_fields] old values, then new ones      */
+  int64_t          *limited;    /* [num_fields] on this rank                                    */
+  rm_integral      *integral;   /* [num_fields]                                                 */
+  double           *extreme;    /* [4][num_fields] least, least, greatest, greatest              */
+
+  /* of the transfer under way: */
+  bool              is_under_way;
+  remap_transfer    how;
+  remap_field_desc *fields; /* [num_fields] */
+  rm_packing        packing;
+  rm_note           note; /* worst status so far                              */
+  remap_status      mine; /* the same without what only neighbours told         */
+  rm_reason         reason;
+};
+
+/* ---- loads ------------------------------------------------------------------------------------------------------- */
+
+static bool has_slope(const remap_transfer *how, const remap_field_desc *field)
+{
+  return how->order > 1 && field->nature != REMAP_FLAG;
+}
+
+/* Do cells that are covered in part take the reconstruction to their centroids, and so need its bounds? */
+static bool needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
+{
+  bool normalises = false;
+
+  for (int f = 0; f < num_fields; f++)
+    normalises |= has_slope(how, &fields[f]) && (how->on_partial == REMAP_PARTIAL_NORMALISE ||
+                                                 (how->on_partial == REMAP_PARTIAL_BLEND && !fields[f].has_old));
+  return normalises && how->limiter != REMAP_LIMITER_NONE && setup->any_partial;
+}
+
+rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
+{
+  const int width = needs_bounds(setup, how, num_fields, fields) ? 6 : 4;
+  rm_load   load  = {.num_fields = num_fields};
+
+  for (int f = 0; f < num_fields; f++) {
+    const bool is_sloped = has_slope(how, &fields[f]);
+
+    load.width += is_sloped ? width : 1;
+    load.has_slopes |= is_sloped;
+    load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
+  }
+  return load;
+}
+
+rm_load rm_load_max(rm_load a, rm_load b)
+{
+  return (rm_load){a.num_fields > b.num_fields ? a.num_fields : b.num_fields, a.width > b.width ? a.width : b.width,
+                   a.has_slopes || b.has_slopes, a.has_nearest || b.has_nearest};
+}
+
+bool rm_load_covers(rm_load a, rm_load b)
+{
+  return a.num_fields >= b.num_fields && a.width >= b.width && a.has_slopes >= b.has_slopes && a.has_nearest >= b.has_nearest;
+}
+
+static void lay_out(rm_carrier *c, int num_fields)
+{
+  rm_packing *p = &c->packing;
+
+  p->num_fields = num_fields;
+  p->is_limited = c->how.limiter != REMAP_LIMITER_NONE;
+  p->has_bounds = needs_bounds(&c->setup, &c->how, num_fields, c->fields);
+  p->width      = 0;
+  for (int f = 0; f < num_fields; f++) {
+    p->order[f] = has_slope(&c->how, &c->fields[f]) ? 2 : 1;
+    p->at[f]    = p->width;
+    p->width += p->order[f] == 1 ? 1 : p->has_bounds ? 6 : 4;
+  }
+}
+
+/* ---- build ------------------------------------------------------------------------------------------------------- */
+
+static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
+{
+  for (rm_lid c = 0; c < stencil->num_cells; c++)
+    for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++) needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
+}
+
+/* All memory that transfers need. Not collective. */
+static remap_status make_room(rm_arena *arena, rm_carrier *c)
+{
+  const rm_transfer_setup *setup = &c->setup;
+  const int                n     = c->load.num_fields;
+  const size_t             bytes = (size_t)n * sizeof(double);
+
+  RM_NEW0(c->needs_halo, arena, setup->giving->num_cells);
+  RM_NEW(c->given, arena, rm_mul_sat(setup->giving->num_cells, n));
+  RM_NEW(c->pack, arena, rm_mul_sat(setup->giving->num_cells, c->load.width));
+  RM_NEW(c->value, arena, rm_mul_sat(setup->receiving->num_cells, n));
+  RM_NEW(c->limited, arena, n);
+  RM_NEW(c->integral, arena, n);
+  RM_NEW(c->extreme, arena, 4 * (int64_t)n);
+  RM_NEW(c->fields, arena, n);
+  RM_NEW(c->packing.at, arena, n);
+  RM_NEW(c->packing.order, arena, n);
+  if (c->load.has_slopes) {
+    RM_TRY(rm_flow_init(arena, setup->giving_stencil->plan, bytes, &c->halo));
+    mark_halo_cells(setup->giving_stencil, c->needs_halo);
+  }
+  if (c->load.has_nearest) RM_TRY(rm_flow_init(arena, c->nearest->plan, bytes, &c->taken));
+  return rm_flow_init(arena, setup->rows->plan, (size_t)c->load.width * sizeof(double), &c->given_flow);
+}
+
+remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out, rm_reason *reason)
+{
+  const rm_comm *comm = setup->comm;
+  rm_carrier    *c    = rm_arena_zero(arena, 1, sizeof *c);
+
+  RM_TRY(rm_comm_agree(comm, c ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(c);
+  c->setup = *setup;
+  c->load  = load;
+  if (load.has_nearest)
+    RM_TRY(rm_nearest_build(arena, comm, setup->receiving, setup->receiving_stencil, setup->rows->cover, &c->nearest, reason));
+  RM_TRY(rm_comm_agree(comm, make_room(arena, c), NULL));
+  *out = c;
+  return REMAP_OK;
+}
+
+bool rm_carrier_is_under_way(const rm_carrier *carrier) { return carrier && carrier->is_under_way; }
+
+void rm_carrier_abandon(rm_carrier *c)
+{
+  if (!rm_carrier_is_under_way(c)) return;
+  c->is_under_way = false;
+  if (c->halo.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->halo, &c->note);
+  if (c->given_flow.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->given_flow, &c->note);
+}
+
+/* ---- start ------------------------------------------------------------------------------------------------------- */
+
+/* Where a cell's value stands in the caller's array. */
+static int64_t place_of(const rm_lid *place, rm_lid cell, int64_t stride) { return (place ? place[cell] : cell) * (stride ? stride : 1); }
+
+static remap_status bad_value(const rm_carrier *c, int f, const rm_mesh *mesh, rm_lid cell, double value, const char *which,
+                              rm_reason *reason)
+{
+  char name[64];
+
+  snprintf(name, sizeof name, "number %d", f);
+  return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[cell], "field %s: %s value %g is not a finite number",
+                 c->fields[f].name ? c->fields[f].name : name, which, value);
+}
+
+/* Values of the giving cells. Those that nobody may have count as 0, whatever stands there. */
+static remap_status gather_given(rm_carrier *c, rm_reason *reason)
+{
+  const rm_mesh *mesh = c->setup.giving;
+  const int      num  = c->packing.num_fields;
+
+  for (int f = 0; f < num; f++)
+    for (rm_lid i = 0; i < mesh->num_cells; i++) {
+      const bool   is_given = c->setup.giving_rows->cover[i] != REMAP_UNWANTED;
+      const double value    = is_given ? c->fields[f].in[place_of(c->setup.giving_place, i, c->fields[f].in_stride)] : 0.0;
+
+      if (!isfinite(value)) return bad_value(c, f, mesh, i, value, "the", reason);
+      c->given[(int64_t)i * num + f] = value;
+    }
+  return REMAP_OK;
+}
+
+/* Old values, where they are used. */
+static remap_status gather_old(rm_carrier *c, rm_reason *reason)
+{
+  const rm_mesh *mesh  = c->setup.receiving;
+  const uint8_t *cover = c->setup.rows->cover;
+  const int      num   = c->packing.num_fields;
+
+  for (int f = 0; f < num; f++)
+    for (rm_lid i = 0; i < mesh->num_cells; i++) {
+      const bool   is_kept = rm_keeps_old(&c->how, &c->fields[f], cover[i]);
+      const double value   = is_kept ? c->fields[f].out[place_of(c->setup.receiving_place, i, c->fields[f].out_stride)] : 0.0;
+
+      if (!isfinite(value)) return bad_value(c, f, mesh, i, value, "the old", reason);
+      c->value[(int64_t)i * num + f] = value;
+    }
+  return REMAP_OK;
+}
+
+static remap_status check_coverage(const rm_carrier *c, rm_reason *reason)
+{
+  const rm_mesh *mesh = c->setup.receiving;
+
+  if (c->how.on_uncovered != REMAP_UNCOVERED_ERROR && c->how.on_partial != REMAP_PARTIAL_ERROR) return REMAP_OK;
+  for (rm_lid i = 0; i < mesh->num_cells; i++) {
+    const uint8_t cover     = c->setup.rows->cover[i];
+    const bool    has_space = fabs(mesh->cell_volume[i]) > 0.0;
+
+    if (cover == REMAP_UNCOVERED && has_space && c->how.on_uncovered == REMAP_UNCOVERED_ERROR)
+      return rm_fail(REMAP_COVERAGE, reason, mesh->side, mesh->cell_global[i], "the cell lies outside of the other mesh");
+    if (cover == REMAP_PARTIAL && c->how.on_partial == REMAP_PARTIAL_ERROR)
+      return rm_fail(REMAP_COVERAGE, reason, mesh->side, mesh->cell_global[i],
+                     "the cell lies outside of the other mesh in part");
+  }
+  return REMAP_OK;
+}
+
+/* What a step on this rank said; the first failure stays. */
+static void note(rm_carrier *c, remap_status status)
+{
+  if (status > c->mine) c->mine = status;
+  if ((int64_t)status > c->note.status) c->note.status = status;
+}
+
+/* Reconstruct the cells whose neighbours are all here, or the others. */
+static void reconstruct(rm_carrier *c, uint8_t which)
+{
+  rm_reconstruct(&c->setup, &c->packing, c->given, (const double *)(const void *)c->halo.received, c->needs_halo, which, c->pack,
+                 c->limited);
+}
+
+/* Does this transfer read the halo? */
+static bool reads_halo(const rm_carrier *c)
+{
+  bool reads = false;
+
+  for (int f = 0; f < c->packing.num_fields; f++) reads |= c->packing.order[f] > 1;
+  return reads;
+}
+
+/* Give what is packed to those who receive it. */
+static void give(rm_carrier *c)
+{
+  note(c, rm_flow_post(c->setup.comm, &c->given_flow, (size_t)c->packing.width * sizeof(double), c->pack, c->note));
+}
+
+void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, const remap_field_desc *fields, uint64_t mark,
+                      remap_status mine, const rm_reason *reason)
+{
+  RM_ASSERT(!c->is_under_way && rm_load_covers(c->load, rm_load_of(&c->setup, how, num_fields, fields)));
+  c->is_under_way = true;
+  c->how          = *how;
+  c->note         = (rm_note){mark, (int64_t)mine};
+  c->mine         = mine;
+  c->reason       = *reason;
+  for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
+  for (int f = 0; f < num_fields; f++) c->limited[f] = 0;
+  lay_out(c, num_fields);
+  if (c->note.status == REMAP_OK) note(c, gather_given(c, &c->reason));
+  if (c->note.status == REMAP_OK) note(c, gather_old(c, &c->reason));
+  if (c->note.status == REMAP_OK) note(c, check_coverage(c, &c->reason));
+  if (num_fields == 0) return;
+  if (reads_halo(c)) {
+    note(c, rm_flow_post(c->setup.comm, &c->halo, (size_t)num_fields * sizeof(double), c->given, c->note));
+  } else {
+    if (c->note.status == REMAP_OK) reconstruct(c, 0), reconstruct(c, 1);
+    give(c);
+  }
+}
+
+/* ---- finish ------------------------------------------------------------------------------------------------------ */
+
+/* Wait for a flow; what its senders say counts. */
+static void await(rm_carrier *c, rm_flow *flow)
+{
+  const remap_status waited = rm_flow_wait(c->setup.comm, flow, &c->note);
+
+  if (waited == REMAP_BAD_ARGUMENT)
+    rm_fail(waited, &c->reason, -1, -1,
+            "direction, transfer, number, natures or old values of fields differ from those of a neighbouring rank");
+  note(c, waited);
+}
+
+/* Uncovered cells take their values. */
+static void take_nearest(rm_carrier *c)
+{
+  const rm_nearest *nearest = c->nearest;
+  const int         num     = c->packing.num_fields;
+  const double     *got     = (const double *)(const void *)c->taken.received;
+
+  note(c, rm_flow_post(c->setup.comm, &c->taken, (size_t)num * sizeof(double), c->value, c->note));
+  await(c, &c->taken);
+  if (c->note.status != REMAP_OK) return;
+  for (int64_t k = 0; k < nearest->num; k++)
+    for (int f = 0; f < num; f++)
+      if (rm_needs_nearest(&c->how, &c->fields[f]))
+        c->value[(int64_t)nearest->cell[k] * num + f] = got[(int64_t)nearest->origin[k] * num + f];
+}
+
+/* Everything up to the new values. */
+static void carry(rm_carrier *c, bool wants_integral)
+{
+  const int  num         = c->packing.num_fields;
+  bool       any_nearest = false;
+  rm_receipt receipt     = {&c->setup, &c->how, c->fields, &c->packing, NULL, c->value, wants_integral ? c->integral : NULL};
+
+  for (int f = 0; f < num; f++) any_nearest |= c->setup.any_uncovered && rm_needs_nearest(&c->how, &c->fields[f]);
+  if (reads_halo(c)) {
+    if (c->note.status == REMAP_OK) reconstruct(c, 0);
+    await(c, &c->halo);
+    if (c->note.status == REMAP_OK) reconstruct(c, 1);
+    give(c);
+  }
+  await(c, &c->given_flow);
+  receipt.got = (const double *)(const void *)c->given_flow.received;
+  if (c->note.status == REMAP_OK) rm_receive(&receipt);
+  if (any_nearest) take_nearest(c);
+}
+
+/* Least and greatest finite value of a field in cells that take part; -0 counts as +0, whichever comes first. */
+static void widen(const double *value, int stride, const rm_rows *rows, double *least, double *greatest)
+{
+  *least    = INFINITY;
+  *greatest = -INFINITY;
+  for (rm_lid i = 0; i < rows->num_cells; i++) {
+    const double x = value[(int64_t)i * stride];
+
+    if (rows->cover[i] == REMAP_UNWANTED || !isfinite(x)) continue;
+    *least    = fmin(*least, x + 0.0);
+    *greatest = fmax(*greatest, x + 0.0);
+  }
+}
+
+/* Collective. */
+static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report *reports)
+{
+  const rm_transfer_setup *setup = &c->setup;
+  const int                n     = c->packing.num_fields;
+  double                  *least = c->extreme, *greatest = c->extreme + 2 * n;
+
+  for (int f = 0; f < n; f++) {
+    widen(c->given + f, n, setup->giving_rows, &least[2 * f], &greatest[2 * f]);
+    widen(c->value + f, n, setup->rows, &least[2 * f + 1], &greatest[2 * f + 1]);
+  }
+  rm_integral_source(setup, c->fields, &c->packing, c->given, c->pack, c->integral);
+  RM_TRY(rm_comm_min_f64(setup->comm, least, 2 * n));
+  RM_TRY(rm_comm_max_f64(setup->comm, greatest, 2 * n));
+  RM_TRY(rm_comm_sum_i64(setup->comm, c->limited, n));
+  RM_TRY(rm_integral_report(scratch, setup, n, c->integral, reports));
+  for (int f = 0; f < n; f++) {
+    const double *low = least + 2 * f, *high = greatest + 2 * f;
+
+    reports[f].order         = c->packing.order[f];
+    reports[f].source_min    = low[0] <= high[0] ? low[0] : 0.0; /* no cells: 0 */
+    reports[f].source_max    = low[0] <= high[0] ? high[0] : 0.0;
+    reports[f].target_min    = low[1] <= high[1] ? low[1] : 0.0;
+    reports[f].target_max    = low[1] <= high[1] ? high[1] : 0.0;
+    reports[f].limited_cells = c->limited[f];
+  }
+  return REMAP_OK;
+}
+
+static remap_status agree_and_report(rm_carrier *c, remap_field_report *reports)
+{
+  rm_arena    *scratch = rm_arena_new();
+  remap_status status;
+
+  note(c, scratch ? REMAP_OK : REMAP_NO_MEMORY);
+  status = rm_comm_agree_reason(c->setup.comm, c->mine, &c->reason);
+  if (status == REMAP_OK) status = report(c, scratch, reports);
+  rm_arena_drop(scratch);
+  return status;
+}
+
+/* Into the caller's arrays. */
+static void write_values(const rm_carrier *c)
+{
+  const int num = c->packing.num_fields;
+
+  for (int f = 0; f < num; f++)
+    for (rm_lid i = 0; i < c->setup.receiving->num_cells; i++)
+      if (c->setup.rows->cover[i] != REMAP_UNWANTED)
+        c->fields[f].out[place_of(c->setup.receiving_place, i, c->fields[f].out_stride)] = c->value[(int64_t)i * num + f];
+}
+
+remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *reports, rm_reason *reason)
+{
+  const int    num = c->packing.num_fields;
+  remap_status status;
+
+  RM_ASSERT(c->is_under_way);
+  c->is_under_way = false;
+  for (int f = 0; f < num && reports; f++) {
+    rm_sum_clear(&c->integral[f].source);
+    rm_sum_clear(&c->integral[f].minus_target);
+    rm_sum_clear(&c->integral[f].magnitude);
+  }
+  if (num > 0) carry(c, reports != NULL);
+  status = (remap_status)c->note.status;
+  if (reports) status = agree_and_report(c, reports);
+  for (int f = 0; f < num && reports && status == REMAP_OK; f++) {
+    reports[f].source_integral *= cubed;
+    reports[f].target_integral *= cubed;
+  }
+  if (status == REMAP_OK) {
+    write_values(c);
+    return REMAP_OK;
+  }
+  *reason = c->reason;
+  return c->mine == REMAP_OK ? rm_fail(status, reason, -1, -1, "a neighbouring rank failed: its message says why") : status;
+}

@@ -1,0 +1,168 @@
+/* receive -- what receiving cells make of what giving cells sent: the content of each is the sum over its row of u V + g.M, and
+ * its coverage decides what becomes of that. O(pairs) per field. */
+#include "field_private.h"
+
+bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover)
+{
+  if (!field->has_old) return false;
+  if (cover == REMAP_UNCOVERED) return how->on_uncovered == REMAP_UNCOVERED_KEEP;
+  return cover == REMAP_PARTIAL && how->on_partial == REMAP_PARTIAL_BLEND && field->nature != REMAP_FLAG;
+}
+
+/* Cells without volume cannot be covered by anything: ERROR overlooks them, and they take the nearest value. */
+bool rm_needs_nearest(const remap_transfer *how, const remap_field_desc *field)
+{
+  switch (how->on_uncovered) {
+    case REMAP_UNCOVERED_KEEP: return !field->has_old;
+    case REMAP_UNCOVERED_FILL: return false;
+    case REMAP_UNCOVERED_NEAREST:
+    case REMAP_UNCOVERED_ERROR: break;
+  }
+  return true;
+}
+
+/* A row, for one field: sums in row order, the first two with compensation. */
+typedef struct row_sums {
+  double content;   /* of u V + g.M */
+  double volume;    /* of V         */
+  double magnitude; /* of |V|       */
+} row_sums;
+
+/* What one giver sent for a field. */
+typedef struct giver_view {
+  double        value; /* scaled                                            */
+  const double *slope; /* scaled; behind it the bounds, if there are any    */
+} giver_view;
+
+static giver_view view(const rm_receipt *w, int f, rm_lid giver)
+{
+  static const double no_slope[3] = {0.0, 0.0, 0.0};
+  const double       *place       = w->got + (int64_t)giver * w->packing->width + w->packing->at[f];
+
+  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->order[f] > 1 ? place + RM_PACK_SLOPE : no_slope};
+}
+
+static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
+{
+  const rm_rows *rows    = w->setup->rows;
+  rm_compensated content = {0.0, 0.0}, volume = {0.0, 0.0};
+  double         magnitude = 0.0;
+
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    const giver_view g = view(w, f, rows->giver[k]);
+    const double    *m = rows->moment[k];
+
+    rm_compensated_add(&content, g.value * rows->volume[k]);
+    rm_compensated_add(&content, g.slope[0] * m[0] + g.slope[1] * m[1] + g.slope[2] * m[2]);
+    rm_compensated_add(&volume, rows->volume[k]);
+    magnitude += fabs(rows->volume[k]);
+  }
+  return (row_sums){rm_compensated_value(&content), rm_compensated_value(&volume), magnitude};
+}
+
+/* True if a volume is what cancellation left of the parts it is made of: nothing may be divided by it. */
+static bool is_void(double volume, const row_sums *s) { return !(fabs(volume) > 0x1p-40 * s->magnitude); }
+
+/* The mean that exists for every row: by the magnitude of the overlaps, else the first giver's value. */
+static double plain_mean(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
+{
+  const rm_rows *rows = w->setup->rows;
+  double         sum  = 0.0;
+
+  if (!(s->magnitude > 0.0)) return view(w, f, rows->giver[rows->offset[cell]]).value;
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++)
+    sum += view(w, f, rows->giver[k]).value * (fabs(rows->volume[k]) / s->magnitude);
+  return sum;
+}
+
+/* The mean over the covered part, each giver's reconstruction taken to the centroid of the whole cell; under a limiter within the
+ * bounds of the givers' neighbourhoods. */
+static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
+{
+  const rm_rows *rows  = w->setup->rows;
+  const double  *x     = w->setup->receiving->cell_centroid[cell];
+  rm_compensated sum   = {0.0, 0.0};
+  double         least = INFINITY, greatest = -INFINITY, mean;
+
+  if (is_void(s->volume, s)) return plain_mean(w, f, cell, s);
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    const giver_view g    = view(w, f, rows->giver[k]);
+    const double    *c    = rows->giver_centroid[rows->giver[k]];
+    const double     rise = g.slope[0] * (x[0] - c[0]) + g.slope[1] * (x[1] - c[1]) + g.slope[2] * (x[2] - c[2]);
+
+    rm_compensated_add(&sum, (g.value + rise) * rows->volume[k]);
+    if (!w->packing->has_bounds || w->packing->order[f] < 2) continue;
+    least    = fmin(least, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE]);
+    greatest = fmax(greatest, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE + 1]);
+  }
+  mean = rm_compensated_value(&sum) / s->volume;
+  return least <= greatest ? fmin(fmax(mean, least), greatest) : mean;
+}
+
+/* The scaled new value of a cell with pairs; its part in the integral goes to integral, if that is not NULL. */
+static double receive_cell(const rm_receipt *w, int f, rm_lid cell, double old, rm_integral *integral)
+{
+  const row_sums s        = sum_row(w, f, cell);
+  const double   volume   = w->setup->receiving->cell_volume[cell];
+  const bool     is_part  = w->setup->rows->cover[cell] == REMAP_PARTIAL;
+  const bool     is_blend = rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
+  double         value;
+
+  if (is_part && !is_blend && w->how->on_partial != REMAP_PARTIAL_CONSERVE) {
+    if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
+    return normalised(w, f, cell, &s);
+  }
+  old *= RM_VALUE_SCALE;
+  if (is_void(volume, &s))
+    value = is_blend ? old : plain_mean(w, f, cell, &s);
+  else
+    value = is_blend ? (s.content + old * (volume - s.volume)) / volume : s.content / volume;
+  if (integral) {
+    rm_integral_add(&integral->minus_target, -value, volume);
+    if (is_blend) {
+      rm_integral_add(&integral->minus_target, old, volume);
+      rm_integral_add(&integral->minus_target, -old, s.volume);
+    }
+  }
+  return value;
+}
+
+/* A flag comes from the cell of largest overlap, the canonically first if some are equal. */
+static double receive_flag(const rm_receipt *w, int f, rm_lid cell)
+{
+  const rm_rows *rows = w->setup->rows;
+  int64_t        best = rows->offset[cell];
+
+  for (int64_t k = best + 1; k < rows->offset[cell + 1]; k++)
+    if (fabs(rows->volume[k]) > fabs(rows->volume[best])) best = k;
+  return w->got[(int64_t)rows->giver[best] * w->packing->width + w->packing->at[f]];
+}
+
+/* The new value of a cell; old is the one it has. */
+static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
+{
+  const rm_rows          *rows     = w->setup->rows;
+  const remap_field_desc *field    = &w->fields[f];
+  const int64_t           first    = rows->offset[cell];
+  rm_integral            *integral = w->integral ? &w->integral[f] : NULL;
+  double                  copied;
+
+  if (rows->cover[cell] == REMAP_UNCOVERED) return rm_keeps_old(w->how, field, REMAP_UNCOVERED) ? old : w->how->fill_value;
+  if (field->nature == REMAP_FLAG) return receive_flag(w, f, cell);
+  if (!rows->same[first]) return receive_cell(w, f, cell, old, integral) / RM_VALUE_SCALE;
+  copied = w->got[(int64_t)rows->giver[first] * w->packing->width + w->packing->at[f]];
+  if (integral) rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied, w->setup->receiving->cell_volume[cell]);
+  return copied;
+}
+
+void rm_receive(const rm_receipt *w)
+{
+  const int num = w->packing->num_fields;
+
+  for (rm_lid c = 0; c < w->setup->receiving->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
+    double *value = w->value + (int64_t)c * num;
+
+    if (w->setup->rows->cover[c] == REMAP_UNWANTED) continue;
+    for (int f = 0; f < num; f++) value[f] = receive(w, f, c, value[f]);
+  }
+}
