@@ -15,7 +15,8 @@ typedef struct pair_record {
   rm_gid  giver_global;
   rm_lid  giver_cell, receiver; /* numbers at their homes */
   int32_t giver_rank;
-  int32_t is_cut; /* not 0: the skin of the giving mesh passes through the receiver */
+  int16_t is_cut;   /* not 0: the skin of the giving mesh passes through the receiver */
+  int16_t is_empty; /* not 0: the giver has no volume; no pair, but its skin counts   */
 } pair_record;
 
 /* A side's rows while they are filled: the arrays of rm_rows, writable. */
@@ -61,7 +62,8 @@ static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_
                        .giver_cell     = from->cell_home[i],
                        .receiver       = to->cell_home[j],
                        .giver_rank     = from->cell_home_rank[i],
-                       .is_cut         = (moments->flags[k] & skin) != 0};
+                       .is_cut         = (moments->flags[k] & skin) != 0,
+                       .is_empty       = (moments->flags[k] & RM_PAIR_EMPTY) != 0};
     for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
       p->moment[d] = moments->moment[k][d] + (backward ? (to->cell_centroid[j][d] - c[d]) * p->volume : 0.0);
   }
@@ -140,16 +142,41 @@ static remap_status sort_rows(rm_arena *scratch, const rm_frame *frame, int64_t 
   return REMAP_OK;
 }
 
-/* Rows of one side out of the records that came. What stays to be filled in is `same` and the plan. */
+/* Mark the cells that a skin passes through, and take the records out that are no pairs. Returns how many stay. */
+static int64_t mark_cut(int64_t n, pair_record *record, uint8_t *is_cut)
+{
+  int64_t kept = 0;
+
+  for (int64_t k = 0; k < n; k++) {
+    is_cut[record[k].receiver] |= record[k].is_cut != 0;
+    if (!record[k].is_empty) record[kept++] = record[k];
+  }
+  return kept;
+}
+
+/* What is left of a cell through which a skin passes is not even rounding of its volume: where zones abut whose faces do not match,
+ * the skins of both pass, and cancel. */
+static bool is_filled(const rows_draft *draft, rm_lid cell, double cell_volume)
+{
+  rm_compensated sum = {-cell_volume, 0.0};
+
+  for (int64_t k = draft->offset[cell]; k < draft->offset[cell + 1]; k++) rm_compensated_add(&sum, draft->volume[k]);
+  return fabs(rm_compensated_value(&sum)) <= 0x1p-44 * fabs(cell_volume);
+}
+
+/* Rows of one side out of the records that came, which are reordered. What stays to be filled in is `same` and the plan. */
 static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame *frame, const rm_mesh *mesh, int64_t n,
-                              const pair_record *record, rows_draft *draft, rm_rows *rows, rm_reason *reason)
+                              pair_record *record, rows_draft *draft, rm_rows *rows, rm_reason *reason)
 {
   rm_lid  *giver_of_record;
   int64_t *place;
+  uint8_t *is_cut;
 
   if (n > INT32_MAX)
     return rm_fail(REMAP_TOO_LARGE, reason, mesh->side, -1, "%lld pairs come to one rank; use more ranks", (long long)n);
   rows->num_cells = mesh->num_cells;
+  RM_NEW0(is_cut, scratch, mesh->num_cells);
+  n = mark_cut(n, record, is_cut);
   RM_TRY(new_rows(arena, mesh->num_cells, n, draft));
   RM_NEW(giver_of_record, scratch, n);
   RM_NEW(place, scratch, n);
@@ -161,17 +188,15 @@ static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame
   RM_TRY(list_givers(arena, scratch, n, record, draft, rows, giver_of_record));
   RM_TRY(sort_rows(scratch, frame, n, record, giver_of_record, draft, rows, place));
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
-    bool is_cut = false;
-
     for (int64_t k = draft->offset[c]; k < draft->offset[c + 1]; k++) {
       const pair_record *p = &record[place[k]];
 
       draft->giver[k]  = giver_of_record[place[k]];
       draft->volume[k] = p->volume;
       for (int d = 0; d < 3; d++) draft->moment[k][d] = p->moment[d];
-      is_cut |= p->is_cut != 0;
     }
-    if (draft->offset[c] < draft->offset[c + 1]) draft->cover[c] = is_cut ? REMAP_PARTIAL : REMAP_COVERED;
+    if (draft->offset[c] == draft->offset[c + 1]) continue; /* uncovered */
+    draft->cover[c] = is_cut[c] && !is_filled(draft, c, mesh->cell_volume[c]) ? REMAP_PARTIAL : REMAP_COVERED;
   }
   return REMAP_OK;
 }

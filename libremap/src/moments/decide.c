@@ -251,7 +251,7 @@ static bool is_just_inside(const work *w, const rm_lid cell[2], int mesh, rm_lid
 /* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons there has area beyond what lies in
  * coplanar triangles of that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not make a cell
  * partial. Where they are put just outside the cell they are no polygons of it; where just inside, their area is taken off.) */
-bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
+bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bool is_flat)
 {
   const rm_lid      cell[2] = {i, s->target};
   const rm_trimesh *own = w->o->mesh[mesh], *other = w->o->mesh[1 - mesh];
@@ -269,8 +269,8 @@ bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh)
     double       shared = 0;
     for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1]; a++) {
       const rm_lid b = other->cell_triangle[a] / 2;
-      if (!coplanar(w, mesh, t, 1 - mesh, b) || facing(w, cell, mesh, t, 1 - mesh, b) < 0) continue;
-      if (!is_just_inside(w, cell, mesh, t, b)) continue;
+      if (!coplanar(w, mesh, t, 1 - mesh, b)) continue;
+      if (!is_flat && (facing(w, cell, mesh, t, 1 - mesh, b) < 0 || !is_just_inside(w, cell, mesh, t, b))) continue;
       const double *c[3] = {other->vertex[other->triangle[b][0]], other->vertex[other->triangle[b][1]], other->vertex[other->triangle[b][2]]};
       shared += shared_area(v, c, k, s->o);
     }

@@ -343,6 +343,26 @@ static remap_status look_again(work *w, rm_lid i, bool sums, bool polygons)
   return w->status;
 }
 
+static uint8_t skins_in(const work *w, rm_lid i, const slot *s, bool is_flat)
+{
+  uint8_t flags = 0;
+
+  if (s->kinds & SKIN_SOURCE && rm_moments_skin_passes(w, i, s, 0, is_flat)) flags |= RM_PAIR_SOURCE_SKIN;
+  if (s->kinds & SKIN_TARGET && rm_moments_skin_passes(w, i, s, 1, is_flat)) flags |= RM_PAIR_TARGET_SKIN;
+  return flags;
+}
+
+/* A pair without volume is none; but where one cell is flat and in the skin, the other may end there. */
+static remap_status drop_pair(work *w, rm_lid i, slot *s)
+{
+  if (w->part->piece[0].cell_volume[i] != 0 && w->part->piece[1].cell_volume[s->target] != 0) return REMAP_OK;
+  const uint8_t flags = skins_in(w, i, s, true);
+
+  if (!flags) return REMAP_OK;
+  memset(s->sum, 0, sizeof s->sum);
+  return push_pair(w, i, s, flags | RM_PAIR_EMPTY);
+}
+
 static remap_status finish_cell(work *w, rm_lid i)
 {
   const double vi = fabs(w->part->piece[0].cell_volume[i]);
@@ -357,16 +377,14 @@ static remap_status finish_cell(work *w, rm_lid i)
   }
   if (sums || polygons) RM_TRY(look_again(w, i, sums, polygons));
   for (int k = 0; k < w->num_slots; k++) {
-    slot   *s = &w->slots[k];
-    uint8_t flags = 0;
+    slot      *s        = &w->slots[k];
+    const bool in_doubt = s->first_polygon != NO_POLYGONS;
 
     w->slot_of[s->target] = -1;
-    if (s->first_polygon != NO_POLYGONS) {
-      if (fabs(s->sum[0]) <= rm_moments_noise(w, i, s) && !rm_moments_has_volume(w, i, s)) continue;
-      if (s->kinds & SKIN_SOURCE && rm_moments_skin_passes(w, i, s, 0)) flags |= RM_PAIR_SOURCE_SKIN;
-      if (s->kinds & SKIN_TARGET && rm_moments_skin_passes(w, i, s, 1)) flags |= RM_PAIR_TARGET_SKIN;
-    }
-    RM_TRY(push_pair(w, i, s, flags));
+    if (in_doubt && fabs(s->sum[0]) <= rm_moments_noise(w, i, s) && !rm_moments_has_volume(w, i, s))
+      RM_TRY(drop_pair(w, i, s));
+    else
+      RM_TRY(push_pair(w, i, s, in_doubt ? skins_in(w, i, s, false) : 0));
   }
   w->num_slots = 0;
   return REMAP_OK;

@@ -7,11 +7,12 @@
 
 enum {
   RM_PAIR_SOURCE_SKIN = 1, /* the source mesh's skin passes through the target cell within this pair: that cell is partial */
-  RM_PAIR_TARGET_SKIN = 2  /* the target mesh's skin passes through the source cell: that one is partial                   */
+  RM_PAIR_TARGET_SKIN = 2, /* the target mesh's skin passes through the source cell: that one is partial                   */
+  RM_PAIR_EMPTY       = 4  /* no pair: one cell has no volume, but its skin passes through the other; volume is 0          */
 };
 
 /* Pairs of this rank's pieces. Read-only once built. Invariants: a pair is listed once, in the order of sources and in no
- * particular order within a source; it is listed if its exact volume is not zero; coordinates are in the mesh room's frame. */
+ * particular order within a source; it is listed if its exact volume is not zero, or as RM_PAIR_EMPTY; coordinates are in the mesh room's frame. */
 typedef struct rm_moments {
   int64_t        num_pairs;
   const rm_lid  *source, *target; /* [num_pairs] cells of part->piece[0] and [1]                                       */

@@ -125,7 +125,8 @@ double rm_moments_noise(const work *w, rm_lid i, const slot *s);
 /* True if the exact volume of the pair, whose sum is within its noise, is not zero (DESIGN 2.6). Needs its polygons. */
 bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s);
 
-/* True if the skin of a mesh passes through the pair's cell of the other mesh. Needs its polygons. */
-bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh);
+/* True if the skin of a mesh passes through the pair's cell of the other mesh. is_flat: one of the two has no volume, and a skin that
+ * lies in the other's face, to whichever side, does not pass through it. Needs its polygons. */
+bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bool is_flat);
 
 #endif

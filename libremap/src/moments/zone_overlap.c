@@ -91,6 +91,13 @@ static double surface(const rm_trimesh *m, rm_lid c)
   return area;
 }
 
+static double largest_coordinate(const double box[6])
+{
+  double most = 0;
+  for (int c = 0; c < 6; c++) most = fmax(most, fabs(box[c]));
+  return most;
+}
+
 static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const candidates *c, remap_faces faces, int64_t num_zones,
                                    const int64_t *zone_cell_offset, rm_zone_overlap *out, rm_reason *reason)
 {
@@ -109,7 +116,8 @@ static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const
     const double v = fabs(m->volume[k]);
 
     if (zone_of(num_zones, zone_cell_offset, a) == zone_of(num_zones, zone_cell_offset, b)) continue;
-    if (v <= 0x1p-20 * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
+    const double most = fmax(largest_coordinate(mesh[0]->cell_box[m->source[k]]), largest_coordinate(mesh[1]->cell_box[m->target[k]]));
+    if (v <= 0x1p-20 * most * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
     const rm_gid low = a < b ? a : b, high = a < b ? b : a;
     if (v < out->volume || (v == out->volume && (low > out->cell[0] || (low == out->cell[0] && high >= out->cell[1])))) continue;
     *out = (rm_zone_overlap){v, {low, high}};
