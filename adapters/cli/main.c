@@ -13,6 +13,7 @@
 #include <math.h>
 #include <mpi.h>
 #include <remap/remap.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -457,7 +458,8 @@ static cli_exit verify(const job *j, cli_failure *why)
     const double error = j->row[k].what.conservation_error;
 
     if (error <= CLI_MAX_CONSERVATION) continue;
-    return cli_fail(why, CLI_VERIFY, "%s: field %s is conserved only within %.1e, the bar is %.0e: nothing is written",
+    return cli_fail(why, CLI_VERIFY,
+                    "%s: field %s is conserved only within %.1e, the bar is %.0e: nothing is written; see whether a mesh folds",
                     j->options.path[REMAP_SOURCE], j->row[k].name, error, CLI_MAX_CONSERVATION);
   }
   return CLI_DONE;
@@ -549,6 +551,7 @@ int main(int argc, char **argv)
   cli_exit    status;
   int         threads;
 
+  signal(SIGXFSZ, SIG_IGN);                                     /* a file that may not grow is a write error like others */
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &threads); /* the other thread only prints */
   MPI_Comm_rank(j.comm, &j.rank);
   j.begin = MPI_Wtime();

@@ -192,7 +192,7 @@ static bool same_file(const char *a, const char *b)
 cli_exit cli_report_open(const char *path, int num_others, const char *const *others, cli_report_file *out, cli_failure *why)
 {
   struct stat  there;
-  const bool   exists = stat(path, &there) == 0, in_place = exists && !S_ISREG(there.st_mode);
+  const bool   exists = lstat(path, &there) == 0, in_place = exists && !S_ISREG(there.st_mode);
   const size_t size = strlen(path) + sizeof ".part";
 
   *out = (cli_report_file){.path = path};

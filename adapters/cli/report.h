@@ -47,7 +47,7 @@ void cli_report_end(FILE *out, const cli_report *report);
 /** A report file under way: it appears under its name when it is complete. */
 typedef struct cli_report_file {
   FILE       *stream;
-  char       *part; /**< the name it has until then; NULL if the final name is no regular file, say a terminal */
+  char       *part; /**< the name it has until then; NULL where it is written in place: a terminal, a pipe, a link */
   const char *path;
 } cli_report_file;
 

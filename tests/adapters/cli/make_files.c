@@ -22,7 +22,8 @@ typedef struct recipe {
   double      second_zone; /* not 0: a second zone, from there on */
   bool        is_ngon;     /* NGON_n and NFACE_n, one cell */
   bool        is_surface;  /* quadrilaterals only */
-  bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices, huge;
+  bool        bow_tie;     /* one cell that is turned inside out over half of its width: its volume nearly cancels */
+  bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices;
 } recipe;
 
 static const recipe recipes[] = {
@@ -31,7 +32,6 @@ static const recipe recipes[] = {
     {.name = "half", .n = 3, .low = .5, .high = 1.5},
     {.name = "old", .n = 3, .low = .5, .high = 1.5, .fields = 7},
     {.name = "far", .n = 2, .low = 10, .high = 11},
-    {.name = "big", .n = 2, .high = 1000},
     {.name = "two_solutions", .n = 2, .high = 1, .fields = 1, .second = 2},
     {.name = "two_zones", .n = 2, .high = 1, .second_zone = 1},
     {.name = "no_volume", .n = 2, .high = 1, .is_surface = true},
@@ -45,7 +45,8 @@ static const recipe recipes[] = {
     {.name = "nan_field", .n = 2, .high = 1, .fields = 1, .nan_field = true},
     {.name = "at_vertices", .n = 2, .high = 1, .fields = 1, .at_vertices = true},
     {.name = "zones_overlap", .n = 2, .high = 1, .second_zone = .25},
-    {.name = "huge", .n = 2, .high = 1, .huge = true},
+    {.name = "wide", .n = 4, .low = -1, .high = 2, .fields = 1},
+    {.name = "bow_tie", .n = 1, .high = 1, .bow_tie = true},
 };
 
 static int file; /* cgio's handle */
@@ -100,6 +101,7 @@ static void add_coordinates(double zone, const recipe *r, double low, double hig
       x[i] = place == r->n ? to : from + (to - from) * place / r->n;
     }
     if (r->nan_coordinate && d == 1) x[count - 1] = NAN;
+    if (r->bow_tie && d == 0) x[2] = x[6] = 1 + 1e-13, x[3] = x[7] = 0;
     add_1d(grid, name[d], "DataArray_t", "R8", count, x);
   }
 }
@@ -174,23 +176,13 @@ static void add_solution(double zone, const recipe *r, const char *name, double 
 
 static void add_zone(double base, const recipe *r, const char *name, double low, double high)
 {
-  const int      row = r->n + 1, count = r->huge ? 2000000000 : row * row * row;
+  const int      row = r->n + 1, count = row * row * row;
   const int      sizes[3] = {count, r->n * r->n * r->n, 0};
   const cgsize_t dims[2]  = {1, 3};
   const double   zone     = add(base, name, "Zone_t", "I4", 2, dims, sizes);
 
   add_text(zone, "ZoneType", "ZoneType_t", "Unstructured");
-  if (r->huge) {
-    const double grid = add(zone, "GridCoordinates", "GridCoordinates_t", "MT", 0, NULL, NULL);
-
-    for (int d = 0; d < 3; d++) {
-      const char coordinate[] = {'C', 'o', 'o', 'r', 'd', 'i', 'n', 'a', 't', 'e', (char)('X' + d), '\0'};
-
-      add_1d(grid, coordinate, "DataArray_t", "R8", count, NULL);
-    }
-  } else if (!r->no_coordinates) {
-    add_coordinates(zone, r, low, high);
-  }
+  if (!r->no_coordinates) add_coordinates(zone, r, low, high);
   if (r->is_surface)
     add_surface(zone);
   else if (r->is_ngon)
