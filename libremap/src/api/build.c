@@ -1,6 +1,7 @@
 /* build -- remap_build: the stages in order, one agreement each. What only the overlay needs lives in an arena that ends with it. */
 #include "api/context.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "moments/zone_overlap.h"
@@ -74,9 +75,21 @@ static remap_status read_meshes(remap_context *ctx, rm_reason *reason)
   return REMAP_OK;
 }
 
+/* The largest coordinate of each mesh over all ranks. */
+static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
+{
+  for (int side = 0; side < 2; side++) {
+    magnitude[side] = 0;
+    for (rm_lid c = 0; c < ctx->mesh[side]->num_cells; c++)
+      for (int k = 0; k < 6; k++) magnitude[side] = fmax(magnitude[side], fabs(ctx->mesh[side]->cell_box[c][k]));
+  }
+  return rm_comm_max_f64(&ctx->comm, magnitude, 2);
+}
+
 /* What happens on this rank alone. */
-static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_part *part, const rm_overlay **overlay,
-                                 const rm_moments **moments, rm_zone_overlap zones[2], rm_reason *reason)
+static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_part *part, const double magnitude[2],
+                                 const rm_overlay **overlay, const rm_moments **moments, rm_zone_overlap zones[2],
+                                 rm_reason *reason)
 {
   const rm_progress progress = {ctx->options.progress, ctx->options.user};
   const rm_trimesh *mesh[2];
@@ -84,7 +97,7 @@ static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_p
   for (int side = 0; side < 2; side++) {
     RM_TRY(rm_trimesh_build(arena, &ctx->frame, &part->piece[side], ctx->options.faces, &mesh[side]));
     RM_TRY(rm_zone_overlap_find(&ctx->frame, &part->piece[side], mesh[side], ctx->options.faces, ctx->labels[side].num_zones,
-                                ctx->labels[side].zone_cell_offset, &zones[side], reason));
+                                ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side], reason));
   }
   RM_TRY(report_progress(ctx, "triangulation", 1));
   RM_TRY(rm_overlay_build(arena, mesh, part, &progress, overlay, reason));
@@ -152,14 +165,15 @@ static remap_status build(remap_context *ctx, rm_arena *passing, rm_reason *reas
   const rm_overlay *overlay = NULL;
   const rm_moments *moments = NULL;
   rm_zone_overlap   zones[2];
-  double            start = rm_seconds();
+  double            start = rm_seconds(), magnitude[2];
 
   RM_TRY(read_meshes(ctx, reason));
   RM_TRY(rm_zone_build(passing, &ctx->comm, ctx->mesh, &zone));
   RM_TRY(rm_part_build(passing, &ctx->comm, &ctx->frame, ctx->mesh, zone, &part, reason));
+  RM_TRY(find_magnitudes(ctx, magnitude));
   ctx->stats.seconds_partition = rm_seconds() - start;
   start                        = rm_seconds();
-  RM_TRY(stage(ctx, overlay_here(ctx, passing, part, &overlay, &moments, zones, reason), reason));
+  RM_TRY(stage(ctx, overlay_here(ctx, passing, part, magnitude, &overlay, &moments, zones, reason), reason));
   RM_TRY(worst_zone_overlap(ctx, zones, reason));
   const int64_t crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
   RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, part, moments, &ctx->mapping, reason));

@@ -43,8 +43,8 @@ typedef struct rm_mapping {
   rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
 } rm_mapping;
 
-/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN, else
- * covered; a source cell likewise by TARGET_SKIN. */
+/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the pairs
+ * leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
 /* Every invariant that one rank can see; slow. Not collective. */

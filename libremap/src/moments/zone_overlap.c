@@ -91,15 +91,8 @@ static double surface(const rm_trimesh *m, rm_lid c)
   return area;
 }
 
-static double largest_coordinate(const double box[6])
-{
-  double most = 0;
-  for (int c = 0; c < 6; c++) most = fmax(most, fabs(box[c]));
-  return most;
-}
-
 static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const candidates *c, remap_faces faces, int64_t num_zones,
-                                   const int64_t *zone_cell_offset, rm_zone_overlap *out, rm_reason *reason)
+                                   const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason)
 {
   rm_part           part;
   const rm_trimesh *mesh[2];
@@ -116,8 +109,7 @@ static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const
     const double v = fabs(m->volume[k]);
 
     if (zone_of(num_zones, zone_cell_offset, a) == zone_of(num_zones, zone_cell_offset, b)) continue;
-    const double most = fmax(largest_coordinate(mesh[0]->cell_box[m->source[k]]), largest_coordinate(mesh[1]->cell_box[m->target[k]]));
-    if (v <= 0x1p-20 * most * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
+    if (v <= 0x1p-20 * magnitude * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
     const rm_gid low = a < b ? a : b, high = a < b ? b : a;
     if (v < out->volume || (v == out->volume && (low > out->cell[0] || (low == out->cell[0] && high >= out->cell[1])))) continue;
     *out = (rm_zone_overlap){v, {low, high}};
@@ -126,7 +118,8 @@ static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const
 }
 
 remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, const rm_trimesh *mesh, remap_faces faces,
-                                  int64_t num_zones, const int64_t *zone_cell_offset, rm_zone_overlap *out, rm_reason *reason)
+                                  int64_t num_zones, const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out,
+                                  rm_reason *reason)
 {
   rm_arena    *arena  = rm_arena_new();
   remap_status status = arena ? REMAP_OK : REMAP_NO_MEMORY;
@@ -146,7 +139,7 @@ remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, 
       rm_boxtree_query(mesh->skin_tree, mesh->skin_box, mesh->cell_box[k], mark, &c);
       any |= c.entered[k];
     }
-    if (status == REMAP_OK && any) status = overlay_marked(arena, frame, &c, faces, num_zones, zone_cell_offset, out, reason);
+    if (status == REMAP_OK && any) status = overlay_marked(arena, frame, &c, faces, num_zones, zone_cell_offset, magnitude, out, reason);
   }
   rm_arena_drop(arena);
   return status;
