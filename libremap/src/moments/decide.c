@@ -115,6 +115,7 @@ void rm_moments_add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, 
 {
   slot         *s = &w->slots[w->slot_of[j]];
   const double *n = pl->n;
+  const point  *start = sign > 0 ? p : q; /* going round the polygon: every corner is the start of a side */
   double        a[3], b[3];
   polygon      *g = NULL;
   corner       *c;
@@ -141,8 +142,8 @@ void rm_moments_add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, 
   }
   if ((w->status = rm_grow(&w->corner, &w->corner_room, w->num_corners + 1, sizeof *w->corner)) != REMAP_OK) return;
   c  = &w->corner[w->num_corners];
-  *c = (corner){g->first_corner, p->mesh, p->edge, p->triangle, p->base};
-  if (p->edge >= 0) c->vertex = limit_vertex(w->o, c);
+  *c = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->base};
+  if (start->edge >= 0) c->vertex = limit_vertex(w->o, c);
   g->first_corner = w->num_corners++;
   g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
   g->num_cones++;
