@@ -261,7 +261,7 @@ bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bo
     const polygon *g = &w->polygon[l];
     const rm_lid   t = g->triangle;
 
-    if (g->mesh != mesh || !own->triangle_is_skin[t] || !has_area(w, i, s, g)) continue;
+    if (g->mesh != mesh || !own->triangle_is_skin[t] || (!has_area(w, i, s, g) && is_line(w, g))) continue;
     const double *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     const double *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
     int           k    = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
