@@ -19,14 +19,14 @@ cksum "$work"/*.cgns >"$work/inputs"
 
 # Run the command on $1 ranks with the other arguments: its exit status goes to $code, its output to $work/stdout and what the
 # ranks themselves write to standard error, without mpiexec's remarks, to $work/stderr. One rank needs no mpiexec. $wrapper, if it
-# is set, is a command that starts the command.
+# is set, starts each rank.
 run() {
   ranks=$1
   shift
   : >"$work/stderr"
   : >"$work/mpiexec"
-  if [ "$ranks" = 1 ]; then
-    timeout 100 ${wrapper:-} "$remap" "$@" </dev/null >"$work/stdout" 2>"$work/stderr"
+  if [ "$ranks" = 1 ] && [ -z "${wrapper:-}" ]; then
+    timeout 100 "$remap" "$@" </dev/null >"$work/stdout" 2>"$work/stderr"
   else
     STDERR=$work/stderr timeout 100 "$mpiexec" "$numproc_flag" "$ranks" sh -c 'exec "$@" 2>>"$STDERR"' sh \
       ${wrapper:-} "$remap" "$@" </dev/null >"$work/stdout" 2>"$work/mpiexec"

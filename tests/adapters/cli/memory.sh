@@ -6,7 +6,7 @@ cd "$work" || exit 1
 "$tools/make_demo" . 12 >/dev/null || exit 1
 cat >short_of_memory <<S
 #!/bin/sh
-[ "\${OMPI_COMM_WORLD_RANK:-1}" != 1 ] || LD_PRELOAD=$no_memory
+[ "\$((OMPI_COMM_WORLD_RANK + 1))" != "\$OMPI_COMM_WORLD_SIZE" ] || LD_PRELOAD=$no_memory
 export LD_PRELOAD
 exec "\$@"
 S
