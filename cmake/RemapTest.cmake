@@ -68,14 +68,29 @@ function(remap_bench thing)
   remap_test_program(bench_${thing} bench/bench_${thing}.c ${T_LIBS})
 endfunction()
 
+# remap_fuzz(<thing> COUNT <inputs> [RANKS 1 2 ...] [LIBS <targets>]): tests/fuzz/fuzz_<thing>.c as the program fuzz_<thing>. CTest
+# lets it take every file of tests/fuzz/corpus/<thing> and so many inputs drawn by lot; with REMAP_FUZZERS it is run by hand.
+function(remap_fuzz thing)
+  cmake_parse_arguments(PARSE_ARGV 1 T "" "COUNT" "RANKS;LIBS")
+  add_executable(fuzz_${thing} fuzz/fuzz_${thing}.c)
+  remap_test_program(fuzz_${thing} fuzz/fuzz_${thing}.c ${T_LIBS})
+  if(REMAP_FUZZERS)
+    target_compile_definitions(fuzz_${thing} PRIVATE REMAP_LIBFUZZER)
+    target_link_options(fuzz_${thing} PRIVATE -fsanitize=fuzzer)
+  else()
+    remap_mpi_test(fuzz ${thing} fuzz_${thing} RANKS ${T_RANKS} TIMEOUT 1000
+      ARGS ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${thing} ${T_COUNT})
+  endif()
+endfunction()
+
 # remap_script_test(<room> <thing> <command...>): a test that is a script.
 function(remap_script_test room thing)
   add_test(NAME ${room}.${thing} COMMAND ${ARGN})
   remap_test_properties(${room}.${thing} ${room} 1)
 endfunction()
 
-# remap_tests_complete(): a test that fails if a file tests/**/test_*.c or bench_*.c is named by no remap_test() or
-# remap_bench().
+# remap_tests_complete(): a test that fails if a file tests/**/test_*.c, bench_*.c or fuzz_*.c is named by no remap_test(),
+# remap_bench() or remap_fuzz().
 function(remap_tests_complete)
   get_property(named GLOBAL PROPERTY REMAP_TEST_FILES)
   list(JOIN named "\n" text)

@@ -2,7 +2,8 @@
 # quickstart.sh demo|test -- from a bare Debian 12 to a running remap; quick when run again.
 #   demo   install what is missing, build, make two warped meshes with a known field, remap between them on two ranks
 #   test   install what is missing, build, run every test
-# Options for CMake go into REMAP_CMAKE_OPTIONS, another build folder into REMAP_BUILD (default: build).
+# Options for CMake go into REMAP_CMAKE_OPTIONS, for CTest into REMAP_CTEST_OPTIONS, another build folder into REMAP_BUILD
+# (default: build).
 set -eu
 cd "$(dirname "$0")/.."
 build=${REMAP_BUILD:-build}
@@ -65,7 +66,8 @@ case ${1:-} in
     install_packages
     build_all
     cd "$build"
-    exec ctest --output-on-failure -j "$cores"
+    # shellcheck disable=SC2086 # the options are words
+    exec ctest --output-on-failure -j "$cores" ${REMAP_CTEST_OPTIONS:-}
     ;;
   *)
     echo "usage: ./cmake/quickstart.sh demo|test" >&2

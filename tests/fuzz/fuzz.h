@@ -13,7 +13,7 @@
  *                                      bytes, and files of the folder with some bytes changed
  *   fuzz_mesh -w FILE NUMBER FOLDER    write the input of that number to a file, for the corpus
  *
- * With the environment variable REMAP_LONG_TESTS, COUNT is taken 500 times. What fails, crashes or takes more than a minute
+ * With the environment variable REMAP_LONG_TESTS, COUNT is taken 1000 times. What fails, crashes or takes more than a minute
  * names its input on stderr. */
 #ifndef FUZZ_H
 #define FUZZ_H
@@ -289,7 +289,7 @@ static inline int fuzz_main_(int argc, char **argv)
   corpus = fuzz_read_(argv[1]);
   count  = argc > 2 ? strtoull(argv[2], NULL, 10) : 0;
   first  = argc > 3 ? strtoull(argv[3], NULL, 10) : 0;
-  if (getenv("REMAP_LONG_TESTS")) count *= 500;
+  if (getenv("REMAP_LONG_TESTS")) count *= 1000;
   for (int i = 0; i < corpus->num_files; i++) fuzz_run_(&corpus->file[i]);
   for (uint64_t i = first; i < first + count; i++) {
     fuzz_input in = fuzz_draw_(corpus, i);
