@@ -434,12 +434,8 @@ static remap_status walk_together(tracer *t, int dir, rm_lid state, walked *how)
 
 static double parameter(const tracer *t, rm_lid b)
 {
-  const double *n = t->other->normal[b], *q = t->other->vertex[t->other->triangle[b][0]];
-  const double  up   = n[0] * (q[0] - t->p0[0]) + n[1] * (q[1] - t->p0[1]) + n[2] * (q[2] - t->p0[2]);
-  const double  down = n[0] * t->u[0] + n[1] * t->u[1] + n[2] * t->u[2];
-  const double  l    = up / down;
-
-  return l > 0 ? l < 1 ? l : 1 : 0; /* NaN becomes 0 */
+  const rm_lid *v = t->other->triangle[b];
+  return rm_crossing_parameter(t->p0, t->p1, t->other->vertex[v[0]], t->other->vertex[v[1]], t->other->vertex[v[2]]);
 }
 
 static void reverse(hit *h, int n)
