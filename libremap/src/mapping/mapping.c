@@ -240,11 +240,16 @@ done:
   return status;
 }
 
-/* 1 for each covered cell with a single pair. */
-static void mark_alone(const rm_rows *rows, uint8_t *alone)
+/* 1 for each covered cell with a single pair that has its volume. (Where no skin passes through a cell, that is its own volume times
+ * how often the giving mesh winds about it, an integer, which is not one if cells are tangled.) */
+static void mark_alone(const rm_mesh *mesh, const rm_rows *rows, uint8_t *alone)
 {
-  for (rm_lid c = 0; c < rows->num_cells; c++)
-    alone[c] = rows->cover[c] == REMAP_COVERED && rows->offset[c + 1] - rows->offset[c] == 1;
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    const int64_t first = rows->offset[c];
+    const double  own   = mesh->cell_volume[c];
+
+    alone[c] = rows->cover[c] == REMAP_COVERED && rows->offset[c + 1] - first == 1 && fabs(rows->volume[first] - own) < fabs(own) / 2;
+  }
 }
 
 /* Mark the pairs of cells that cover each other alone: both homes know their half, and the plans carry it across. Collective. */
@@ -264,7 +269,7 @@ static remap_status mark_same(const rm_comm *comm, const rm_mesh *const mesh[2],
     have         = alone[side] && heard[side] && buffer[side];
   }
   RM_GOTO(done, status = rm_comm_agree(comm, have ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  for (int side = 0; side < 2; side++) mark_alone(&rows[side], alone[side]);
+  for (int side = 0; side < 2; side++) mark_alone(mesh[side], &rows[side], alone[side]);
   for (int side = 0; side < 2 && status == REMAP_OK; side++)
     status = rm_plan_run(comm, rows[side].plan, 1, alone[1 - side], heard[side], buffer[side]);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
