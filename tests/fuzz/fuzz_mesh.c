@@ -4,7 +4,10 @@
 #include "fuzz.h"
 #include "meshes.h"
 
-#define FEW 8 /* values of a palette */
+enum {
+  FEW        = 8,      /* values of a palette              */
+  MOST_ITEMS = 100000  /* in an array that is handed over  */
+};
 
 /* ---- the mesh -------------------------------------------------------------------------------------------------------- */
 
@@ -47,6 +50,9 @@ static void turn_over(tm_mesh *m, int64_t face)
     m->face_node[k] = node;
   }
 }
+
+/* A count as it stands, but nothing that is too much to allot and would yet be believed. */
+static int64_t credible(int64_t count) { return count > MOST_ITEMS && count <= INT32_MAX ? INT64_MAX : count; }
 
 /* How many of each the mesh was made with: damage stays inside its arrays. */
 typedef struct sizes {
@@ -102,9 +108,9 @@ static void damage_the_rest(tm_mesh *m, const sizes *n, fuzz_bytes *b)
       if (n->cells) m->global[fuzz_below(b, n->cells)] = an_index(b, n->cells);
       break;
     case 1: view->cell_global = NULL; break;
-    case 2: view->num_cells = an_index(b, n->cells); break;
-    case 3: view->num_faces = an_index(b, n->faces); break;
-    case 4: view->num_nodes = an_index(b, n->nodes); break;
+    case 2: view->num_cells = credible(an_index(b, n->cells)); break;
+    case 3: view->num_faces = credible(an_index(b, n->faces)); break;
+    case 4: view->num_nodes = credible(an_index(b, n->nodes)); break;
     case 5:
       if (n->zones) m->zone_offset[fuzz_below(b, n->zones + 1)] = an_index(b, n->cells);
       break;
@@ -129,7 +135,7 @@ static void damage_the_rest(tm_mesh *m, const sizes *n, fuzz_bytes *b)
  * cannot be meant get no items: they are refused before anything is read. */
 static const void *tight(const void *from, int64_t have, int64_t count, size_t size)
 {
-  const int64_t items = count < 0 || count > 100000 ? 0 : count;
+  const int64_t items = count < 0 || count > MOST_ITEMS ? 0 : count;
   char         *copy;
 
   if (!from) return NULL;
