@@ -61,14 +61,17 @@ static void must(int error, const char *what)
   exit(1);
 }
 
-/* A node; type MT has no data, data NULL leaves the array unwritten. */
+/* A node; type MT has no data. */
 static double add(double parent, const char *name, const char *label, const char *type, int nd, const cgsize_t *dims,
                   const void *data)
 {
+  char   full_name[33] = "", full_label[33] = ""; /* the CGNS library reads as much, whatever is in it */
   double id;
 
-  must(cgio_create_node(file, parent, name, &id), name);
-  must(cgio_set_label(file, id, label), name);
+  memcpy(full_name, name, strlen(name));
+  memcpy(full_label, label, strlen(label));
+  must(cgio_create_node(file, parent, full_name, &id), name);
+  must(cgio_set_label(file, id, full_label), name);
   if (strcmp(type, "MT")) must(cgio_set_dimensions(file, id, type, nd, dims), name);
   if (data) must(cgio_write_all_data(file, id, data), name);
   return id;
