@@ -36,6 +36,7 @@ typedef struct rm_trimesh {
   const rm_lid (*triangle_edge)[3];     /* [num_triangles]                                                       */
   const rm_lid (*side)[2];              /* [num_triangles] left and right cell, RM_OUTSIDE where there is none   */
   const uint8_t *triangle_is_skin;      /* [num_triangles] 1: skin of the whole mesh, not only of this piece     */
+  const rm_lid  *triangle_face;         /* [num_triangles] face of the piece, the lowest if it is of two         */
   const double (*normal)[3];            /* [num_triangles] rounded; magnitude is twice the area                  */
   const rm_lid (*edge)[2];              /* [num_edges] vertices, ascending                                       */
   const rm_lid  *star_offset;           /* [num_edges + 1]                                                       */

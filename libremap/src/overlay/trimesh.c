@@ -17,6 +17,7 @@ enum {
 typedef struct corner_triple {
   rm_lid  v[3];  /* ascending vertices */
   rm_lid  cell;  /* the cell beside it */
+  rm_lid  face;  /* of the piece */
   uint8_t right; /* 1: the cell is on the side the normal points to */
   uint8_t skin;
 } corner_triple;
@@ -151,7 +152,7 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   RM_NEW(triple, b->scratch, n);
   for (int64_t k = 0; k < b->num_raw; k++) {
     const rm_lid  face = b->raw_face[k];
-    corner_triple t    = {{vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, 0, p->face_is_skin[face]};
+    corner_triple t    = {{vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, face, 0, p->face_is_skin[face]};
     int           odd  = 0;
 
     if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
@@ -181,19 +182,21 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
 /* Join the two copies of a triangle that lie on opposite sides; any other number of copies stays apart, each a skin. */
 static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
 {
-  rm_lid (*triangle)[3], (*side)[2];
+  rm_lid (*triangle)[3], (*side)[2], *face;
   uint8_t *skin;
   rm_lid   count = 0;
 
   RM_NEW(triangle, arena, num);
   RM_NEW(side, arena, num);
   RM_NEW(skin, arena, num);
+  RM_NEW(face, arena, num);
   for (int64_t i = 0; i < num;) {
     int64_t k = i + 1;
     while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
     const bool joined = k == i + 2 && triple[i].right != triple[i + 1].right;
     for (; i < k; i += 1 + joined) {
       memcpy(triangle[count], triple[i].v, sizeof *triangle);
+      face[count]    = joined && triple[i + 1].face < triple[i].face ? triple[i + 1].face : triple[i].face;
       side[count][0] = side[count][1] = RM_OUTSIDE;
       side[count][triple[i].right]    = triple[i].cell;
       if (joined) side[count][triple[i + 1].right] = triple[i + 1].cell;
@@ -204,6 +207,7 @@ static remap_status join_triangles(rm_arena *arena, const corner_triple *triple,
   m->triangle         = (const rm_lid (*)[3])triangle;
   m->side             = (const rm_lid (*)[2])side;
   m->triangle_is_skin = skin;
+  m->triangle_face    = face;
   return REMAP_OK;
 }
 

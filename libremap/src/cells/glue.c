@@ -1,0 +1,319 @@
+/* glue -- cells from polygons: two sides of polygons belong to one cell if they face each other around an edge. Around most edges
+ * the labels tell which do, for every label is there twice; around others, where a cell touches itself, the polygons are ordered by
+ * exact signs. The shells that result are cells, unless one winds the other way: that is a void in another of its label.
+ * O(n log n) for n polygon sides. */
+#include "cells/cells_private.h"
+
+#include <math.h>
+#include <string.h>
+#include "cells/arcs.h"
+
+enum { MAX_AROUND = 1024 };
+
+typedef struct work {
+  rm_arena          *arena, *scratch;
+  const rm_limit    *l;
+  const rm_polygons *p;
+  rm_arcs            arcs;
+  rm_lid            *parent; /* [2 num polygons] */
+} work;
+
+static rm_lid root(rm_lid *parent, rm_lid k)
+{
+  while (parent[k] != k) k = parent[k] = parent[parent[k]];
+  return k;
+}
+
+static void join(work *w, rm_lid a, rm_lid b)
+{
+  a = root(w->parent, a), b = root(w->parent, b);
+  if (a < b) w->parent[b] = a;
+  else w->parent[a] = b;
+}
+
+static inline rm_label label_of(const work *w, rm_lid side) { return w->p->polygon[side / 2].label[side & 1]; }
+static inline bool same_label(rm_label a, rm_label b) { return a.cell[0] == b.cell[0] && a.cell[1] == b.cell[1]; }
+static inline bool is_outside(rm_label a) { return a.cell[0] == RM_OUTSIDE && a.cell[1] == RM_OUTSIDE; }
+
+/* ---- around an edge -------------------------------------------------------------------------------------------------- */
+
+/* Join the sides that face each other if every label is there twice; false if one is not. */
+static bool join_by_label(work *w, const rm_arc *arc, rm_lid n)
+{
+  rm_lid side[8];
+
+  if (n > 4) return false;
+  for (rm_lid k = 0; k < 2 * n; k++) side[k] = 2 * arc[k / 2].polygon + (k & 1);
+  for (rm_lid k = 0; k < 2 * n; k++) {
+    int times = 0;
+    if (is_outside(label_of(w, side[k]))) continue;
+    for (rm_lid m = 0; m < 2 * n; m++) times += same_label(label_of(w, side[k]), label_of(w, side[m]));
+    if (times != 2) return false;
+  }
+  for (rm_lid k = 0; k < 2 * n; k++)
+    for (rm_lid m = k + 1; m < 2 * n; m++)
+      if (!is_outside(label_of(w, side[k])) && same_label(label_of(w, side[k]), label_of(w, side[m]))) join(w, side[k], side[m]);
+  return true;
+}
+
+/* An edge of a mesh on which both spots lie; false if there is none. */
+static bool common_edge(const rm_limit *l, rm_lid p, rm_lid q, const double *line[2])
+{
+  for (int side = 0; side < 2; side++) {
+    const rm_trimesh *m = l->o->mesh[side];
+    const rm_feature  f = l->spot[p].at[side];
+    rm_lid            first = 0, last = f.kind == RM_ON_EDGE;
+
+    if (f.kind == RM_ON_VERTEX) first = m->vertex_edge_offset[f.id], last = m->vertex_edge_offset[f.id + 1];
+    for (rm_lid k = first; k < last; k++) {
+      const rm_lid e = f.kind == RM_ON_VERTEX ? m->vertex_edge[k] : f.id;
+      if (!rm_on_edge(l, side, q, e)) continue;
+      for (int h = 0; h < 2; h++) line[h] = m->vertex[m->edge[e][h]];
+      return true;
+    }
+  }
+  return false;
+}
+
+/* A corner of the polygon's triangle on the polygon's side of the line, which runs as the polygon does; NULL if there is none. */
+static const double *corner_of(const work *w, const rm_polygon *g, const double a[3], const double b[3])
+{
+  const int         side = g->triangle[0] >= 0 ? 0 : 1;
+  const rm_trimesh *m = w->l->o->mesh[side];
+  const rm_lid     *v = m->triangle[g->triangle[side]];
+  double            o[3];
+
+  rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
+  for (int h = 0; h < 3; h++)
+    if (rm_orient3d(a, b, m->vertex[v[h]], o) > 0) return m->vertex[v[h]];
+  return NULL;
+}
+
+typedef struct spoke {
+  const double *corner;
+  int           quarter; /* of a turn from the first: 0 below half, 1 half, 2 above */
+  rm_lid        arc;
+} spoke;
+
+static remap_status join_by_angle(work *w, const rm_arc *arc, rm_lid n)
+{
+  const rm_lid  p = arc[0].low, q = arc[0].high;
+  const double *line[2];
+  spoke         s[MAX_AROUND];
+  int           sign = 0;
+
+  if (n > MAX_AROUND) return REMAP_TOO_LARGE;
+  if (!common_edge(w->l, p, q, line)) return REMAP_BAD_MESH;
+  for (int k = 0; k < 3 && !sign; k++)
+    if (line[0][k] != line[1][k]) sign = rm_compare(w->l, q, p, k) * (line[1][k] > line[0][k] ? 1 : -1);
+  const double *a = line[sign > 0 ? 0 : 1], *b = line[sign > 0 ? 1 : 0]; /* a to b as low to high */
+  for (rm_lid k = 0; k < n; k++) {
+    spoke  x = {corner_of(w, &w->p->polygon[arc[k].polygon], arc[k].against ? b : a, arc[k].against ? a : b), 0, k};
+    rm_lid i = k;
+    if (!x.corner) return REMAP_BAD_MESH;
+    const int turn = k ? rm_orient3d(a, b, s[0].corner, x.corner) : 1;
+    x.quarter      = k == 0 ? -1 : turn > 0 ? 0 : turn == 0 ? 1 : 2;
+    for (; i > 0; i--) {
+      const spoke *y = &s[i - 1];
+      if (y->quarter < x.quarter || (y->quarter == x.quarter && rm_orient3d(a, b, y->corner, x.corner) >= 0)) break;
+      s[i] = *y;
+    }
+    s[i] = x;
+  }
+  for (rm_lid k = 0; k < n; k++) {
+    const rm_arc *x = &arc[s[k].arc], *y = &arc[s[(k + 1) % n].arc];
+    const rm_lid  front = 2 * x->polygon + !x->against, back = 2 * y->polygon + y->against;
+    if (!same_label(label_of(w, front), label_of(w, back))) return REMAP_BAD_MESH;
+    if (!is_outside(label_of(w, front))) join(w, front, back);
+  }
+  return REMAP_OK;
+}
+
+static remap_status join_sides(work *w)
+{
+  for (int64_t k = 0, next; k < w->arcs.num; k = next) {
+    const rm_arc *arc = w->arcs.arc + k;
+    for (next = k + 1; next < w->arcs.num && rm_same_arc(&w->arcs.arc[next], arc);) next++;
+    if (!join_by_label(w, arc, (rm_lid)(next - k))) RM_TRY(join_by_angle(w, arc, (rm_lid)(next - k)));
+  }
+  return REMAP_OK;
+}
+
+/* ---- shells ------------------------------------------------------------------------------------------------------------ */
+
+static inline double largest(const double x[3]) { return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))); }
+
+/* Six times the volume of the cone from o over a polygon; a bound of its error is added to *noise. */
+static double cone(const work *w, const rm_polygon *g, const double o[3], double *noise)
+{
+  const rm_lid *v = w->p->vertex + g->first;
+  double        a[3], b[3], c[3], sum = 0;
+
+  for (int k = 0; k < 3; k++) a[k] = w->l->xyz[v[0]][k] - o[k], b[k] = w->l->xyz[v[1]][k] - o[k];
+  for (rm_lid i = 2; i < g->num; i++) {
+    for (int k = 0; k < 3; k++) c[k] = w->l->xyz[v[i]][k] - o[k];
+    sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    const double reach = fmax(largest(a), fmax(largest(b), largest(c)));
+    *noise += reach * reach * (0x1p-46 * reach + 16 * (w->l->error[v[0]] + w->l->error[v[i - 1]] + w->l->error[v[i]]));
+    memcpy(b, c, sizeof b);
+  }
+  return sum;
+}
+
+/* Solid angle of a polygon seen from o. */
+static double solid_angle(const work *w, const rm_polygon *g, const double o[3])
+{
+  const rm_lid *v = w->p->vertex + g->first;
+  double        d[3][3], r[3], sum = 0;
+
+  for (rm_lid i = 2; i < g->num; i++) {
+    const rm_lid x[3] = {v[0], v[i - 1], v[i]};
+    for (int h = 0; h < 3; h++) {
+      for (int k = 0; k < 3; k++) d[h][k] = w->l->xyz[x[h]][k] - o[k];
+      r[h] = sqrt(d[h][0] * d[h][0] + d[h][1] * d[h][1] + d[h][2] * d[h][2]);
+    }
+    const double det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) + d[0][1] * (d[1][2] * d[2][0] - d[1][0] * d[2][2]) +
+                       d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
+    double dot[3];
+    for (int h = 0; h < 3; h++) dot[h] = d[h][0] * d[(h + 1) % 3][0] + d[h][1] * d[(h + 1) % 3][1] + d[h][2] * d[(h + 1) % 3][2];
+    sum += 2 * atan2(det, r[0] * r[1] * r[2] + dot[0] * r[2] + dot[1] * r[0] + dot[2] * r[1]);
+  }
+  return sum;
+}
+
+typedef struct shells {
+  rm_lid    num;
+  rm_lid   *of; /* [sides] shell of a root, RM_OUTSIDE */
+  rm_lid   *first_side;
+  rm_lid   *inside; /* the shell whose void it is, or itself */
+  rm_label *label;
+  double   *volume;
+  bool     *is_void; /* winds the other way, beyond rounding */
+} shells;
+
+static remap_status collect_shells(work *w, shells *s)
+{
+  const rm_lid sides = (rm_lid)(2 * w->p->num);
+  double      *noise;
+
+  RM_NEW(s->of, w->scratch, sides);
+  RM_NEW(s->first_side, w->scratch, sides);
+  for (rm_lid k = 0; k < sides; k++) {
+    if (is_outside(label_of(w, k))) {
+      s->of[k] = RM_OUTSIDE;
+    } else if (root(w->parent, k) == k) {
+      s->first_side[s->num] = k;
+      s->of[k]              = s->num++;
+    } else {
+      s->of[k] = s->of[root(w->parent, k)];
+    }
+  }
+  RM_NEW(s->inside, w->scratch, s->num);
+  RM_NEW(s->label, w->scratch, s->num);
+  RM_NEW0(s->volume, w->scratch, s->num);
+  RM_NEW0(noise, w->scratch, s->num);
+  RM_NEW(s->is_void, w->scratch, s->num);
+  for (rm_lid k = 0; k < s->num; k++) s->inside[k] = k, s->label[k] = label_of(w, s->first_side[k]);
+  for (rm_lid k = 0; k < sides; k++) {
+    if (s->of[k] < 0) continue;
+    const double *o = w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[s->of[k]] / 2].first]];
+    s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], o, &noise[s->of[k]]);
+  }
+  for (rm_lid k = 0; k < s->num; k++) s->is_void[k] = 6 * s->volume[k] < -noise[k];
+  return REMAP_OK;
+}
+
+static uint64_t label_key(rm_label a) { return (uint64_t)(uint32_t)(a.cell[0] + 1) << 32 | (uint32_t)(a.cell[1] + 1); }
+
+/* The shell among those of ids list[0..n) that winds about a vertex of the void. */
+static rm_lid shell_around(const work *w, const shells *s, rm_lid hollow, const rm_keyed *list, int64_t n)
+{
+  const double *o    = w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[hollow] / 2].first]];
+  rm_lid        best = -1;
+  double        most = 0;
+
+  for (int64_t k = 0; k < n; k++) {
+    const rm_lid x = (rm_lid)list[k].item;
+    double       angle = 0;
+    if (s->is_void[x]) continue;
+    for (rm_lid side = 0; side < 2 * w->p->num; side++)
+      if (s->of[side] == x) angle += (side & 1 ? -1 : 1) * solid_angle(w, &w->p->polygon[side / 2], o);
+    if (best < 0 || angle > most) best = x, most = angle;
+  }
+  return best;
+}
+
+static remap_status place_voids(work *w, shells *s)
+{
+  rm_keyed *key, *spare;
+  bool      any = false;
+
+  for (rm_lid k = 0; k < s->num; k++) any = any || s->is_void[k];
+  if (!any) return REMAP_OK;
+  RM_NEW(key, w->scratch, s->num);
+  RM_NEW(spare, w->scratch, s->num);
+  for (rm_lid k = 0; k < s->num; k++) key[k] = (rm_keyed){label_key(s->label[k]), k};
+  rm_sort_keyed(key, spare, s->num);
+  for (int64_t k = 0, next; k < s->num; k = next) {
+    rm_lid solid = 0, last = -1;
+    for (next = k; next < s->num && key[next].key == key[k].key; next++)
+      if (!s->is_void[key[next].item]) solid++, last = (rm_lid)key[next].item;
+    for (int64_t i = k; i < next; i++) {
+      const rm_lid x = (rm_lid)key[i].item;
+      if (!s->is_void[x] || solid == 0) continue;
+      s->inside[x] = solid == 1 ? last : shell_around(w, s, x, key + k, next - k);
+    }
+  }
+  return REMAP_OK;
+}
+
+static remap_status number_cells(work *w, shells *s, rm_glued *out)
+{
+  const rm_lid sides = (rm_lid)(2 * w->p->num);
+  rm_lid      *cell, *cell_of;
+  rm_label    *label;
+  double      *volume;
+
+  RM_NEW(cell, w->arena, sides);
+  RM_NEW(cell_of, w->scratch, s->num);
+  RM_NEW(label, w->arena, s->num);
+  RM_NEW0(volume, w->arena, s->num);
+  out->num_cells = 0;
+  for (rm_lid k = 0; k < s->num; k++)
+    if (s->inside[k] == k) {
+      label[out->num_cells] = s->label[k];
+      cell_of[k]            = out->num_cells++;
+    }
+  for (rm_lid k = 0; k < s->num; k++) {
+    cell_of[k] = cell_of[s->inside[k]];
+    volume[cell_of[k]] += s->volume[k];
+  }
+  for (rm_lid k = 0; k < sides; k++) cell[k] = s->of[k] < 0 ? RM_OUTSIDE : cell_of[s->of[k]];
+  out->cell   = cell;
+  out->label  = label;
+  out->volume = volume;
+  return REMAP_OK;
+}
+
+static remap_status glue(work *w, rm_glued *out)
+{
+  shells s = {0};
+
+  if (w->p->num > INT32_MAX / 2 - 8) return REMAP_TOO_LARGE;
+  RM_TRY(rm_arcs_build(w->scratch, w->l->num_spots, w->p, &w->arcs));
+  RM_NEW(w->parent, w->scratch, 2 * w->p->num);
+  for (rm_lid k = 0; k < 2 * w->p->num; k++) w->parent[k] = k;
+  RM_TRY(join_sides(w));
+  RM_TRY(collect_shells(w, &s));
+  RM_TRY(place_voids(w, &s));
+  return number_cells(w, &s, out);
+}
+
+remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, rm_glued *out)
+{
+  work         w = {.arena = arena, .scratch = rm_arena_new(), .l = l, .p = p};
+  remap_status status = w.scratch ? glue(&w, out) : REMAP_NO_MEMORY;
+
+  rm_arena_drop(w.scratch);
+  return status;
+}

@@ -1,0 +1,505 @@
+/* limit -- where the two meshes touch, found exactly, and the vertices of the supermesh that follow.
+ *
+ * The overlay finds every crossing of an edge with the inside of a triangle, but thinks mesh 2 moved by an infinitesimal. Three
+ * kinds of contacts say all about its limit: vertices of one mesh on triangles of the other, either way, and edges that cross each
+ * other inside. A crossing whose edge or triangle takes part in one of them at its place becomes that contact; all others are
+ * vertices of their own. O(n log n): one query of a box tree per vertex and per edge of mesh 1. */
+#include "cells/cells_private.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* An edge of mesh 1 and one of mesh 2 that cross inside both. */
+typedef struct edge_contact {
+  rm_lid edge[2], spot;
+} edge_contact;
+
+typedef struct builder {
+  rm_arena      *arena, *scratch;
+  const rm_part *part;
+  rm_limit      *l;
+  rm_reason     *reason;
+  uint8_t       *edge_present[2]; /* [side][num_edges] some present triangle has the edge */
+  rm_feature    *at[2];           /* [side][num_vertices] where the vertex lies in the other mesh */
+  edge_contact  *contact;         /* ascending by edge[0] */
+  int64_t        num_contacts, contact_room;
+  rm_lid        *contact_first[2]; /* [side][num_edges + 1] */
+  rm_lid        *contact_of[2];    /* contacts of an edge   */
+  rm_spot       *spot;
+  int64_t        spot_room;
+  rm_lid        *on_edge_offset[2], *on_edge[2]; /* vertices of the other mesh on an edge of `side` */
+} builder;
+
+static inline const double *corner(const rm_trimesh *m, rm_lid t, int h) { return m->vertex[m->triangle[t][h]]; }
+
+/* ---- triangles that lie on each other ------------------------------------------------------------------------------ */
+
+static bool has_area(const rm_trimesh *m, rm_lid t)
+{
+  double o[3];
+  return rm_off_plane(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), o);
+}
+
+static remap_status overlapping(const builder *b, int side, rm_lid cell)
+{
+  return rm_fail(REMAP_BAD_MESH, b->reason, side, cell >= 0 ? b->part->piece[side].cell_global[cell] : -1,
+                 "this cell overlaps another of its mesh; a supermesh needs cells that do not");
+}
+
+/* The sides of triangles first..last - 1, which lie on each other, less the cells that are on both. */
+static remap_status net_sides(const builder *b, int side, rm_lid first, rm_lid last, rm_lid net[2])
+{
+  const rm_trimesh *m = b->l->o->mesh[side];
+  int               left = 0;
+
+  net[0] = net[1] = RM_OUTSIDE;
+  for (int h = 0; h < 2; h++) {
+    left = 0;
+    for (rm_lid t = first; t < last; t++) {
+      const rm_lid c = m->side[t][h];
+      int          times = 0;
+      if (c < 0) continue;
+      for (rm_lid s = first; s < last; s++) times += (m->side[s][h] == c) - (m->side[s][1 - h] == c);
+      if (times <= 0 || net[h] == c) continue;
+      net[h] = c;
+      left += times;
+    }
+    if (left > 1) return overlapping(b, side, net[h]);
+  }
+  return REMAP_OK;
+}
+
+static remap_status join_copies(builder *b, int side)
+{
+  const rm_trimesh *m = b->l->o->mesh[side];
+  rm_lid           *first, (*cell)[2];
+
+  RM_NEW(first, b->arena, m->num_triangles);
+  RM_NEW(cell, b->arena, m->num_triangles);
+  RM_NEW0(b->edge_present[side], b->scratch, m->num_edges);
+  for (rm_lid t = 0, last; t < m->num_triangles; t = last) {
+    for (last = t + 1; last < m->num_triangles && !memcmp(m->triangle[last], m->triangle[t], sizeof *m->triangle);) last++;
+    rm_lid net[2] = {RM_OUTSIDE, RM_OUTSIDE};
+    if (has_area(m, t)) RM_TRY(net_sides(b, side, t, last, net));
+    for (rm_lid s = t; s < last; s++) first[s] = t, memcpy(cell[s], net, sizeof net);
+    for (int h = 0; h < 3 && net[0] != net[1]; h++) b->edge_present[side][m->triangle_edge[t][h]] = 1;
+  }
+  b->l->first_copy[side] = first;
+  b->l->cell[side]       = (const rm_lid (*)[2])cell;
+  return REMAP_OK;
+}
+
+/* ---- contacts ------------------------------------------------------------------------------------------------------- */
+
+static remap_status tree_of(rm_arena *scratch, rm_lid n, const double (*vertex)[3], const rm_lid *item, int corners, double (**box)[6],
+                            const rm_boxtree **tree)
+{
+  RM_NEW(*box, scratch, n);
+  for (rm_lid k = 0; k < n; k++)
+    for (int c = 0; c < 3; c++) {
+      double low = vertex[item[corners * (int64_t)k]][c], high = low;
+      for (int h = 1; h < corners; h++) {
+        const double x = vertex[item[corners * (int64_t)k + h]][c];
+        low = x < low ? x : low, high = x > high ? x : high;
+      }
+      (*box)[k][c] = low, (*box)[k][c + 3] = high;
+    }
+  return rm_boxtree_build(scratch, n, (const double (*)[6])*box, tree);
+}
+
+typedef struct vertex_query {
+  const rm_limit *l;
+  int             other;
+  const double   *p;
+  rm_feature      found;
+} vertex_query;
+
+/* Where in triangle t of the other mesh the point lies, if it does; the lowest feature wins. */
+static int touch_triangle(void *user, rm_lid t)
+{
+  vertex_query     *q = user;
+  const rm_trimesh *m = q->l->o->mesh[q->other];
+  const double     *v[3] = {corner(m, t, 0), corner(m, t, 1), corner(m, t, 2)};
+  double            o[3];
+  int               turn[3], zeros = 0;
+
+  if (rm_orient3d(v[0], v[1], v[2], q->p) != 0 || !rm_is_present(q->l, q->other, t)) return 0;
+  if (!rm_off_plane(v[0], v[1], v[2], o)) return 0;
+  for (int h = 0; h < 3; h++) {
+    turn[h] = rm_orient3d(v[h], v[(h + 1) % 3], q->p, o);
+    if (turn[h] < 0) return 0;
+    zeros += turn[h] == 0;
+  }
+  if (zeros == 2) {
+    const int h = turn[0] ? 2 : turn[1] ? 0 : 1; /* the corner between the two sides it is on */
+    q->found = (rm_feature){RM_ON_VERTEX, m->triangle[t][h]};
+    return 1;
+  }
+  if (zeros == 1) {
+    const int h = !turn[0] ? 0 : !turn[1] ? 1 : 2;
+    q->found = (rm_feature){RM_ON_EDGE, m->triangle_edge[t][h]};
+  } else {
+    q->found = (rm_feature){RM_ON_TRIANGLE, t};
+  }
+  return 0;
+}
+
+static remap_status place_vertices(builder *b, int side)
+{
+  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
+  const rm_boxtree *tree;
+  double          (*box)[6];
+
+  RM_NEW(b->at[side], b->scratch, own->num_vertices);
+  RM_TRY(tree_of(b->scratch, other->num_triangles, other->vertex, &other->triangle[0][0], 3, &box, &tree));
+  for (rm_lid v = 0; v < own->num_vertices; v++) {
+    const double *p = own->vertex[v], at[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};
+    vertex_query  q = {b->l, 1 - side, p, {RM_ON_NOTHING, -1}};
+
+    rm_boxtree_query(tree, (const double (*)[6])box, at, touch_triangle, &q);
+    b->at[side][v] = q.found;
+  }
+  return REMAP_OK;
+}
+
+typedef struct edge_query {
+  builder      *b;
+  rm_lid        edge;
+  const double *p0, *p1;
+  remap_status  status;
+} edge_query;
+
+/* Edges that are coplanar and cross inside both: each has its ends on both sides of the other. */
+static int touch_edge(void *user, rm_lid f)
+{
+  edge_query       *q  = user;
+  const rm_trimesh *m2 = q->b->l->o->mesh[1];
+  const double     *f0 = m2->vertex[m2->edge[f][0]], *f1 = m2->vertex[m2->edge[f][1]];
+  double            o[3];
+
+  if (rm_orient3d(q->p0, q->p1, f0, f1) != 0 || !q->b->edge_present[1][f]) return 0;
+  if (!rm_off_plane(q->p0, q->p1, f0, o) && !rm_off_plane(q->p0, q->p1, f1, o)) return 0;
+  if (rm_orient3d(o, q->p0, q->p1, f0) * rm_orient3d(o, q->p0, q->p1, f1) >= 0) return 0;
+  if (rm_orient3d(o, f0, f1, q->p0) * rm_orient3d(o, f0, f1, q->p1) >= 0) return 0;
+  q->status = rm_grow(&q->b->contact, &q->b->contact_room, q->b->num_contacts + 1, sizeof *q->b->contact);
+  if (q->status != REMAP_OK) return 1;
+  q->b->contact[q->b->num_contacts++] = (edge_contact){{q->edge, f}, -1};
+  return 0;
+}
+
+static remap_status cross_edges(builder *b)
+{
+  const rm_trimesh *m1 = b->l->o->mesh[0], *m2 = b->l->o->mesh[1];
+  const rm_boxtree *tree;
+  double          (*box)[6];
+
+  RM_TRY(tree_of(b->scratch, m2->num_edges, m2->vertex, &m2->edge[0][0], 2, &box, &tree));
+  for (rm_lid e = 0; e < m1->num_edges; e++) {
+    edge_query q = {b, e, m1->vertex[m1->edge[e][0]], m1->vertex[m1->edge[e][1]], REMAP_OK};
+    double     at[6];
+
+    if (!b->edge_present[0][e]) continue;
+    for (int c = 0; c < 3; c++) at[c] = fmin(q.p0[c], q.p1[c]), at[c + 3] = fmax(q.p0[c], q.p1[c]);
+    rm_boxtree_query(tree, (const double (*)[6])box, at, touch_edge, &q);
+    RM_TRY(q.status);
+  }
+  for (int side = 0; side < 2; side++) {
+    const rm_trimesh *m = b->l->o->mesh[side];
+    rm_lid           *first;
+
+    RM_NEW0(first, b->scratch, (int64_t)m->num_edges + 2);
+    RM_NEW(b->contact_of[side], b->scratch, b->num_contacts);
+    for (int64_t k = 0; k < b->num_contacts; k++) first[b->contact[k].edge[side] + 2]++;
+    for (rm_lid e = 0; e < m->num_edges; e++) first[e + 2] += first[e + 1];
+    for (int64_t k = 0; k < b->num_contacts; k++) b->contact_of[side][first[b->contact[k].edge[side] + 1]++] = (rm_lid)k;
+    b->contact_first[side] = first;
+  }
+  return REMAP_OK;
+}
+
+/* ---- spots ---------------------------------------------------------------------------------------------------------- */
+
+static remap_status push_spot(builder *b, rm_feature at1, rm_feature at2, rm_lid *out)
+{
+  if (b->l->num_spots == INT32_MAX - 8) return REMAP_TOO_LARGE;
+  RM_TRY(rm_grow(&b->spot, &b->spot_room, (int64_t)b->l->num_spots + 1, sizeof *b->spot));
+  b->spot[b->l->num_spots] = (rm_spot){{at1, at2}};
+  *out = b->l->num_spots++;
+  return REMAP_OK;
+}
+
+static remap_status vertex_spots(builder *b)
+{
+  for (int side = 0; side < 2; side++) {
+    const rm_trimesh *m = b->l->o->mesh[side];
+    rm_lid           *spot;
+
+    RM_NEW(spot, b->arena, m->num_vertices);
+    for (rm_lid v = 0; v < m->num_vertices; v++) {
+      const rm_feature own = {RM_ON_VERTEX, v}, other = b->at[side][v];
+      if (side == 1 && other.kind == RM_ON_VERTEX) spot[v] = b->l->vertex_spot[0][other.id];
+      else RM_TRY(push_spot(b, side ? other : own, side ? own : other, &spot[v]));
+    }
+    b->l->vertex_spot[side] = spot;
+  }
+  for (int64_t k = 0; k < b->num_contacts; k++)
+    RM_TRY(push_spot(b, (rm_feature){RM_ON_EDGE, b->contact[k].edge[0]}, (rm_feature){RM_ON_EDGE, b->contact[k].edge[1]},
+                     &b->contact[k].spot));
+  return REMAP_OK;
+}
+
+/* The contact at which edge e of `side` crosses triangle t of the other mesh, -1 if there is none. */
+static rm_lid contact_at(const builder *b, int side, rm_lid e, rm_lid t)
+{
+  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
+
+  for (int h = 0; h < 2; h++) {
+    const rm_lid v = own->edge[e][h];
+    if (rm_in_triangle(b->l, 1 - side, b->at[side][v], t)) return b->l->vertex_spot[side][v];
+  }
+  for (int h = 0; h < 3; h++) {
+    const rm_feature f = b->at[1 - side][other->triangle[t][h]];
+    if (f.kind == RM_ON_EDGE && f.id == e) return b->l->vertex_spot[1 - side][other->triangle[t][h]];
+  }
+  for (rm_lid k = b->contact_first[side][e]; k < b->contact_first[side][e + 1]; k++) {
+    const edge_contact *c = &b->contact[b->contact_of[side][k]];
+    for (int h = 0; h < 3; h++)
+      if (other->triangle_edge[t][h] == c->edge[1 - side]) return c->spot;
+  }
+  return -1;
+}
+
+static remap_status crossing_spots(builder *b, int side)
+{
+  const rm_trimesh *own = b->l->o->mesh[side];
+  const rm_trace   *trace = &b->l->o->trace[side];
+  const rm_lid     *copy  = b->l->first_copy[1 - side];
+  rm_lid           *spot;
+
+  RM_NEW(spot, b->arena, trace->num_crossings);
+  for (rm_lid e = 0; e < own->num_edges; e++)
+    for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) {
+      const rm_lid     t = copy[trace->crossing[x].triangle / 2];
+      const rm_feature edge = {RM_ON_EDGE, e}, triangle = {RM_ON_TRIANGLE, t};
+
+      spot[x] = contact_at(b, side, e, t);
+      for (int64_t y = trace->first[e]; y < x && spot[x] < 0; y++)
+        if (copy[trace->crossing[y].triangle / 2] == t) spot[x] = spot[y];
+      if (spot[x] < 0) RM_TRY(push_spot(b, side ? triangle : edge, side ? edge : triangle, &spot[x]));
+    }
+  b->l->crossing_spot[side] = spot;
+  return REMAP_OK;
+}
+
+static remap_status coordinates(builder *b)
+{
+  double(*xyz)[3], *error;
+  rm_spot *spot;
+
+  RM_NEW(spot, b->arena, b->l->num_spots);
+  RM_NEW(xyz, b->arena, b->l->num_spots);
+  RM_NEW(error, b->arena, b->l->num_spots);
+  for (rm_lid p = 0; p < b->l->num_spots; p++) {
+    double line[2][3], plane[3][3], size = 0, reach = 0;
+
+    spot[p] = b->spot[p];
+    if (!rm_spot_meeting(b->l->o, &spot[p], line, plane)) {
+      memcpy(xyz[p], line[0], sizeof *xyz);
+      error[p] = 0;
+      continue;
+    }
+    const double lambda = rm_crossing_parameter(line[0], line[1], plane[0], plane[1], plane[2]);
+    for (int c = 0; c < 3; c++) {
+      const double u = line[1][c] - line[0][c];
+      xyz[p][c] = line[0][c] + lambda * u;
+      size      = fmax(size, fabs(u));
+      reach     = fmax(reach, fmax(fabs(line[0][c]), fabs(line[1][c])));
+    }
+    error[p] = 0x1p-48 * size + 0x1p-52 * reach;
+  }
+  b->l->spot  = spot;
+  b->l->xyz   = (const double (*)[3])xyz;
+  b->l->error = error;
+  return REMAP_OK;
+}
+
+/* ---- vertices of the other mesh on edges and in triangles -------------------------------------------------------------- */
+
+static remap_status file_vertices(builder *b, int side)
+{
+  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
+  int64_t          *inner_offset;
+  rm_lid           *inner, *on_offset, *on, num_inner = 0, num_on = 0;
+
+  RM_NEW0(inner_offset, b->arena, (int64_t)own->num_triangles + 2);
+  RM_NEW0(on_offset, b->scratch, (int64_t)own->num_edges + 2);
+  for (rm_lid v = 0; v < other->num_vertices; v++) {
+    const rm_feature f = b->at[1 - side][v];
+    if (f.kind == RM_ON_TRIANGLE) inner_offset[f.id + 2]++, num_inner++;
+    if (f.kind == RM_ON_EDGE) on_offset[f.id + 2]++, num_on++;
+  }
+  for (rm_lid t = 0; t < own->num_triangles; t++) inner_offset[t + 2] += inner_offset[t + 1];
+  for (rm_lid e = 0; e < own->num_edges; e++) on_offset[e + 2] += on_offset[e + 1];
+  RM_NEW(inner, b->arena, num_inner);
+  RM_NEW(on, b->scratch, num_on);
+  for (rm_lid v = 0; v < other->num_vertices; v++) {
+    const rm_feature f = b->at[1 - side][v];
+    if (f.kind == RM_ON_TRIANGLE) inner[inner_offset[f.id + 1]++] = b->l->vertex_spot[1 - side][v];
+    if (f.kind == RM_ON_EDGE) on[on_offset[f.id + 1]++] = v;
+  }
+  b->l->inner_offset[side] = inner_offset;
+  b->l->inner_spot[side]   = inner;
+  b->on_edge_offset[side]  = on_offset;
+  b->on_edge[side]         = on;
+  return REMAP_OK;
+}
+
+/* ---- lines ------------------------------------------------------------------------------------------------------------ */
+
+typedef struct line {
+  rm_lid *spot, *state;
+  int64_t num, room[2];
+} line;
+
+static remap_status line_room(line *l)
+{
+  RM_TRY(rm_grow(&l->spot, &l->room[0], l->num + 1, sizeof *l->spot));
+  return rm_grow(&l->state, &l->room[1], l->num + 1, sizeof *l->state);
+}
+
+static void plane_of_spot(const builder *b, int side, rm_lid e, rm_lid p, double plane[3][3])
+{
+  const rm_spot *s = &b->l->spot[p];
+  double         ignored[2][3];
+
+  if (s->at[1 - side].kind == RM_ON_VERTEX)
+    rm_vertex_plane(b->l->o->mesh[side], e, b->l->o->mesh[1 - side]->vertex[s->at[1 - side].id], plane);
+  else if (s->at[0].kind != RM_ON_EDGE || side == 0)
+    rm_spot_meeting(b->l->o, s, ignored, plane);
+  else { /* two edges: seen from that of mesh 2 */
+    const rm_trimesh *m1 = b->l->o->mesh[0], *m2 = b->l->o->mesh[1];
+    const rm_lid     *f = m1->edge[s->at[0].id];
+    memcpy(plane[0], m1->vertex[f[0]], sizeof plane[0]);
+    memcpy(plane[1], m1->vertex[f[1]], sizeof plane[1]);
+    if (!rm_off_plane(plane[0], plane[1], m2->vertex[m2->edge[e][0]], plane[2]))
+      rm_off_plane(plane[0], plane[1], m2->vertex[m2->edge[e][1]], plane[2]);
+  }
+}
+
+/* Put a spot inside edge e, which has no crossing, to its place among those from first on. */
+static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, int64_t first, rm_lid p)
+{
+  const rm_trimesh *m  = b->l->o->mesh[side];
+  const double     *p0 = m->vertex[m->edge[e][0]], *p1 = m->vertex[m->edge[e][1]];
+  double            mine[3][3], its[3][3];
+  int64_t           low = first + 1, high = l->num - 1; /* it lies before one of low..high */
+
+  for (int64_t k = first; k < l->num; k++)
+    if (l->spot[k] == p) return REMAP_OK;
+  plane_of_spot(b, side, e, p, mine);
+  while (low < high) {
+    const int64_t middle = (low + high) / 2;
+    plane_of_spot(b, side, e, l->spot[middle], its);
+    if (rm_crossing_order(p0, p1, (const double (*)[3])mine, (const double (*)[3])its, 1) < 0) high = middle;
+    else low = middle + 1;
+  }
+  RM_TRY(line_room(l));
+  for (int64_t k = l->num; k > low; k--) l->spot[k] = l->spot[k - 1], l->state[k] = l->state[k - 1];
+  l->spot[low]  = p;
+  l->state[low] = l->state[low - 1];
+  l->num++;
+  return REMAP_OK;
+}
+
+static remap_status one_line(const builder *b, int side, rm_lid e, line *l)
+{
+  const rm_trimesh *m     = b->l->o->mesh[side];
+  const rm_trace   *trace = &b->l->o->trace[side];
+  const int64_t     first = l->num;
+
+  RM_TRY(line_room(l));
+  l->spot[l->num]    = b->l->vertex_spot[side][m->edge[e][0]];
+  l->state[l->num++] = trace->state[e];
+  for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) {
+    const rm_lid p = b->l->crossing_spot[side][x];
+    if (p != l->spot[l->num - 1]) {
+      RM_TRY(line_room(l));
+      l->spot[l->num++] = p;
+    }
+    l->state[l->num - 1] = trace->crossing[x].state;
+  }
+  if (l->spot[l->num - 1] != b->l->vertex_spot[side][m->edge[e][1]]) {
+    RM_TRY(line_room(l));
+    l->spot[l->num]    = b->l->vertex_spot[side][m->edge[e][1]];
+    l->state[l->num++] = RM_UNKNOWN;
+  }
+  if (!b->edge_present[side][e]) return REMAP_OK;
+  for (rm_lid k = b->on_edge_offset[side][e]; k < b->on_edge_offset[side][e + 1]; k++)
+    RM_TRY(insert_spot(b, side, e, l, first, b->l->vertex_spot[1 - side][b->on_edge[side][k]]));
+  for (rm_lid k = b->contact_first[side][e]; k < b->contact_first[side][e + 1]; k++)
+    RM_TRY(insert_spot(b, side, e, l, first, b->contact[b->contact_of[side][k]].spot));
+  return REMAP_OK;
+}
+
+static remap_status lines(builder *b, int side)
+{
+  const rm_trimesh *m = b->l->o->mesh[side];
+  line              l = {0};
+  int64_t          *offset;
+  rm_lid           *spot, *state;
+  remap_status      status = REMAP_OK;
+
+  RM_NEW(offset, b->arena, (int64_t)m->num_edges + 1);
+  for (rm_lid e = 0; e < m->num_edges && status == REMAP_OK; e++) {
+    offset[e] = l.num;
+    status    = one_line(b, side, e, &l);
+  }
+  offset[m->num_edges] = l.num;
+  spot  = rm_arena_alloc(b->arena, l.num, sizeof *spot);
+  state = rm_arena_alloc(b->arena, l.num, sizeof *state);
+  if (status == REMAP_OK && !(spot && state)) status = REMAP_NO_MEMORY;
+  if (status == REMAP_OK && l.num) {
+    memcpy(spot, l.spot, sizeof *spot * (size_t)l.num);
+    memcpy(state, l.state, sizeof *state * (size_t)l.num);
+  }
+  free(l.spot);
+  free(l.state);
+  b->l->line_offset[side] = offset;
+  b->l->line_spot[side]   = spot;
+  b->l->line_state[side]  = state;
+  return status;
+}
+
+/* ----------------------------------------------------------------------------------------------------------------------- */
+
+static remap_status build(builder *b)
+{
+  for (int side = 0; side < 2; side++) RM_TRY(join_copies(b, side));
+  for (int side = 0; side < 2; side++) RM_TRY(place_vertices(b, side));
+  RM_TRY(cross_edges(b));
+  RM_TRY(vertex_spots(b));
+  for (int side = 0; side < 2; side++) RM_TRY(crossing_spots(b, side));
+  RM_TRY(coordinates(b));
+  for (int side = 0; side < 2; side++) RM_TRY(file_vertices(b, side));
+  for (int side = 0; side < 2; side++) RM_TRY(lines(b, side));
+  return REMAP_OK;
+}
+
+remap_status rm_limit_build(rm_arena *arena, const rm_part *part, const rm_overlay *o, const rm_limit **out, rm_reason *reason)
+{
+  builder      b = {.arena = arena, .scratch = rm_arena_new(), .part = part, .reason = reason};
+  remap_status status = b.scratch ? REMAP_OK : REMAP_NO_MEMORY;
+
+  b.l = rm_arena_zero(arena, 1, sizeof *b.l);
+  if (!b.l) status = REMAP_NO_MEMORY;
+  if (status == REMAP_OK) {
+    b.l->o = o;
+    status = build(&b);
+  }
+  free(b.contact);
+  free(b.spot);
+  rm_arena_drop(b.scratch);
+  if (status == REMAP_OK) *out = b.l;
+  return status;
+}

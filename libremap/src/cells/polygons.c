@@ -1,0 +1,666 @@
+/* polygons -- the planar graph in every triangle, made of the vertices along its edges and of its meetings with the other mesh,
+ * and the polygons that it bounds.
+ *
+ * A triangle meets a triangle of the other mesh, if not in a point, in one segment, and an edge that lies in its plane likewise.
+ * These arcs do not cross. Around a vertex they are ordered by exact turns; a walk that keeps to the left then goes around each
+ * polygon. In which cell of the other mesh a polygon lies, its arcs tell: the side of the triangle that made them, the state of the
+ * edge, or, where an arc runs along an edge of the other mesh, the place among the triangles around that edge. A polygon that lies
+ * on a triangle of the other mesh is made once, by mesh 1. O(a log a) for the a arcs of a triangle. */
+#include "cells/cells_private.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { NOT_CALLED = -1, OUTER = -2 };
+
+/* An arc seen from one end; arc k has halves 2 k and 2 k + 1. */
+typedef struct half {
+  rm_lid from;  /* node */
+  rm_lid state; /* of the other mesh on its left, RM_UNKNOWN */
+  rm_lid next;
+  rm_lid cycle;
+} half;
+
+typedef struct arc {
+  rm_lid from, to, left, right; /* spots, states */
+} arc;
+
+typedef struct cycle {
+  rm_lid half, num, state, component, inside; /* inside: the cycle whose hole it is, -1 */
+  double area;
+} cycle;
+
+typedef struct edge_spot {
+  rm_lid edge, spot;
+} edge_spot;
+
+/* A segment as one triangle sees it: from p to q the other triangle's left cell is on the left. */
+typedef struct segment {
+  rm_lid other, p, q;
+} segment;
+
+typedef struct work {
+  rm_arena       *scratch;
+  const rm_part  *part;
+  const rm_limit *l;
+  rm_reason      *reason;
+  rm_polygons    *out;
+  int             side;
+  rm_lid          t;
+  rm_view         view;
+  int64_t        *segment_offset[2]; /* [side][num_triangles + 1] */
+  segment        *segment[2];
+  rm_lid         *node_of; /* [num_spots] NOT_CALLED */
+  rm_lid         *spot;    /* [num_nodes] */
+  rm_lid         *degree_offset, *around, *component;
+  half           *half;
+  arc            *arc;
+  cycle          *cycle;
+  edge_spot      *touch;
+  int64_t         spot_room, degree_room, around_room, component_room, half_room, arc_room, cycle_room, touch_room;
+  rm_lid          num_nodes, num_halves, num_boundary, num_arcs, num_cycles, num_touches;
+} work;
+
+static inline int other_side(const work *w) { return 1 - w->side; }
+
+static remap_status tangled(const work *w)
+{
+  const rm_lid *cell = w->l->o->mesh[w->side]->side[w->t];
+  const rm_lid  c    = cell[0] >= 0 ? cell[0] : cell[1];
+  return rm_fail(REMAP_BAD_MESH, w->reason, w->side, c >= 0 ? w->part->piece[w->side].cell_global[c] : -1,
+                 "a face of this cell meets cells of the other mesh that overlap, or overlaps faces of its own mesh; a supermesh "
+                 "needs cells that do not");
+}
+
+/* ---- segments of both sides --------------------------------------------------------------------------------------------- */
+
+static remap_status file_segments(work *w)
+{
+  const rm_overlay *o = w->l->o;
+
+  for (int side = 0; side < 2; side++) {
+    const rm_lid nt = o->mesh[side]->num_triangles;
+    int64_t     *offset;
+    segment     *s = NULL;
+
+    RM_NEW0(offset, w->scratch, (int64_t)nt + 2);
+    for (int pass = 0; pass < 2; pass++) {
+      for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++)
+        for (int64_t k = o->end_offset[t]; k < o->end_offset[t + 1]; k += 2) {
+          const rm_end *end = &o->end[k];
+          const rm_lid  b = end->other, own = w->l->first_copy[side][side ? b : t], other = w->l->first_copy[1 - side][side ? t : b];
+          rm_lid        p[2];
+          for (int h = 0; h < 2; h++) p[h] = w->l->crossing_spot[end[h].at >> 1 & 1][end[h].at >> 2];
+          if (p[0] == p[1] || !rm_is_present(w->l, 0, side ? other : own) || !rm_is_present(w->l, 1, side ? own : other)) continue;
+          if (pass == 0) offset[own + 2]++;
+          else s[offset[own + 1]++] = (segment){other, p[side], p[1 - side]};
+        }
+      if (pass == 0) {
+        for (rm_lid t = 0; t < nt; t++) offset[t + 2] += offset[t + 1];
+        RM_NEW(s, w->scratch, offset[nt + 1]);
+      }
+    }
+    w->segment_offset[side] = offset;
+    w->segment[side]        = s;
+  }
+  return REMAP_OK;
+}
+
+/* ---- the graph of one triangle -------------------------------------------------------------------------------------------- */
+
+static remap_status node(work *w, rm_lid spot, rm_lid *out)
+{
+  if (w->node_of[spot] == NOT_CALLED) {
+    RM_TRY(rm_grow(&w->spot, &w->spot_room, (int64_t)w->num_nodes + 1, sizeof *w->spot));
+    w->node_of[spot]      = w->num_nodes;
+    w->spot[w->num_nodes++] = spot;
+  }
+  *out = w->node_of[spot];
+  return REMAP_OK;
+}
+
+static remap_status add_arc(work *w, rm_lid from, rm_lid to, rm_lid left, rm_lid right)
+{
+  half h[2] = {{-1, left, -1, NOT_CALLED}, {-1, right, -1, right == OUTER ? OUTER : NOT_CALLED}};
+
+  RM_TRY(node(w, from, &h[0].from));
+  RM_TRY(node(w, to, &h[1].from));
+  RM_TRY(rm_grow(&w->half, &w->half_room, (int64_t)w->num_halves + 2, sizeof *w->half));
+  memcpy(w->half + w->num_halves, h, sizeof h);
+  w->num_halves += 2;
+  return REMAP_OK;
+}
+
+static bool both_on_edge(const work *w, int side, rm_lid t, rm_lid p, rm_lid q)
+{
+  const rm_lid *e = w->l->o->mesh[side]->triangle_edge[t];
+
+  for (int h = 0; h < 3; h++)
+    if (rm_on_edge(w->l, side, p, e[h]) && rm_on_edge(w->l, side, q, e[h])) return true;
+  return false;
+}
+
+/* A present triangle of mesh `side` on which both spots lie, and an edge of it on which they do, -1; false if there is none. */
+static bool carrier(const work *w, int side, rm_lid p, rm_lid q, rm_lid *triangle, rm_lid *edge)
+{
+  const rm_trimesh *m = w->l->o->mesh[side];
+  const rm_feature  f = w->l->spot[p].at[side], g = w->l->spot[q].at[side];
+  rm_lid            first = 0, last = 1;
+
+  *triangle = *edge = -1;
+  if (f.kind == RM_ON_NOTHING || g.kind == RM_ON_NOTHING) return false;
+  if (f.kind == RM_ON_TRIANGLE) {
+    *triangle = rm_in_triangle(w->l, side, g, f.id) && rm_is_present(w->l, side, f.id) ? f.id : -1;
+    return *triangle >= 0;
+  }
+  if (f.kind == RM_ON_VERTEX) first = m->vertex_edge_offset[f.id], last = m->vertex_edge_offset[f.id + 1];
+  for (rm_lid k = first; k < last; k++) {
+    const rm_lid e = f.kind == RM_ON_VERTEX ? m->vertex_edge[k] : f.id;
+    for (rm_lid z = m->star_offset[e]; z < m->star_offset[e + 1]; z++) {
+      const rm_lid t = w->l->first_copy[side][m->star[z] / 4];
+      if (!rm_is_present(w->l, side, t)) continue;
+      if (rm_on_edge(w->l, side, q, e)) {
+        *edge = e, *triangle = t;
+        return true;
+      }
+      if (*triangle < 0 && rm_in_triangle(w->l, side, g, t)) *triangle = t;
+    }
+  }
+  if (*triangle >= 0) /* the common edge may be the one across the vertex */
+    for (int h = 0; h < 3; h++) {
+      const rm_lid e = m->triangle_edge[*triangle][h];
+      if (rm_on_edge(w->l, side, p, e) && rm_on_edge(w->l, side, q, e)) *edge = e;
+    }
+  return *triangle >= 0;
+}
+
+static remap_status boundary(work *w)
+{
+  const rm_trimesh *m = w->l->o->mesh[w->side];
+  const rm_limit   *l = w->l;
+
+  for (int h = 0; h < 3; h++) {
+    const rm_lid  e = m->triangle_edge[w->t][h];
+    const rm_lid *spot = l->line_spot[w->side] + l->line_offset[w->side][e], *state = l->line_state[w->side] + l->line_offset[w->side][e];
+    const rm_lid  n = (rm_lid)(l->line_offset[w->side][e + 1] - l->line_offset[w->side][e]);
+
+    for (rm_lid i = 0; i + 1 < n; i++) {
+      const rm_lid k = h == 2 ? n - 2 - i : i, p = spot[k], q = spot[k + 1];
+      rm_lid       at = state[k], triangle, edge;
+      if (carrier(w, other_side(w), p, q, &triangle, &edge)) at = RM_UNKNOWN;
+      if (at < RM_OUTSIDE) return tangled(w);
+      RM_TRY(h == 2 ? add_arc(w, q, p, at, OUTER) : add_arc(w, p, q, at, OUTER));
+    }
+  }
+  w->num_boundary = w->num_nodes;
+  return REMAP_OK;
+}
+
+static remap_status push_arc(work *w, arc a)
+{
+  if (a.from > a.to) a = (arc){a.to, a.from, a.right, a.left};
+  RM_TRY(rm_grow(&w->arc, &w->arc_room, (int64_t)w->num_arcs + 1, sizeof *w->arc));
+  w->arc[w->num_arcs++] = a;
+  return REMAP_OK;
+}
+
+static remap_status segments(work *w)
+{
+  const rm_limit *l = w->l;
+
+  for (int64_t k = w->segment_offset[w->side][w->t]; k < w->segment_offset[w->side][w->t + 1]; k++) {
+    const segment *s = &w->segment[w->side][k];
+    if (both_on_edge(w, w->side, w->t, s->p, s->q)) continue;
+    const bool    along = both_on_edge(w, other_side(w), s->other, s->p, s->q);
+    const rm_lid *cell  = l->cell[other_side(w)][s->other];
+    RM_TRY(push_arc(w, (arc){s->p, s->q, along ? RM_UNKNOWN : cell[0], along ? RM_UNKNOWN : cell[1]}));
+  }
+  return REMAP_OK;
+}
+
+/* ---- edges of the other mesh in the plane of the triangle --------------------------------------------------------------- */
+
+static remap_status push_touch(work *w, rm_lid spot)
+{
+  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const rm_feature  f = w->l->spot[spot].at[other_side(w)];
+  rm_lid            first = 0, last = 1;
+
+  if (f.kind != RM_ON_VERTEX && f.kind != RM_ON_EDGE) return REMAP_OK;
+  if (f.kind == RM_ON_VERTEX) first = m->vertex_edge_offset[f.id], last = m->vertex_edge_offset[f.id + 1];
+  RM_TRY(rm_grow(&w->touch, &w->touch_room, (int64_t)w->num_touches + last - first, sizeof *w->touch));
+  for (rm_lid k = first; k < last; k++)
+    w->touch[w->num_touches++] = (edge_spot){f.kind == RM_ON_VERTEX ? m->vertex_edge[k] : f.id, spot};
+  return REMAP_OK;
+}
+
+static int by_edge(const void *a, const void *b)
+{
+  const edge_spot *x = a, *y = b;
+  return x->edge != y->edge ? (x->edge > y->edge) - (x->edge < y->edge) : (x->spot > y->spot) - (x->spot < y->spot);
+}
+
+static bool edge_is_present(const work *w, int side, rm_lid e)
+{
+  const rm_trimesh *m = w->l->o->mesh[side];
+
+  for (rm_lid z = m->star_offset[e]; z < m->star_offset[e + 1]; z++)
+    if (rm_is_present(w->l, side, w->l->first_copy[side][m->star[z] / 4])) return true;
+  return false;
+}
+
+/* Edges of the other mesh that meet the closed triangle in two points lie in its plane, and nowhere else. */
+static remap_status edges_in_plane(work *w)
+{
+  const rm_limit *l = w->l;
+
+  w->num_touches = 0;
+  for (rm_lid k = 0; k < w->num_boundary; k++) RM_TRY(push_touch(w, w->spot[k]));
+  for (int64_t k = l->inner_offset[w->side][w->t]; k < l->inner_offset[w->side][w->t + 1]; k++)
+    RM_TRY(push_touch(w, l->inner_spot[w->side][k]));
+  if (w->num_touches < 2) return REMAP_OK;
+  qsort(w->touch, (size_t)w->num_touches, sizeof *w->touch, by_edge);
+  for (rm_lid k = 0; k + 1 < w->num_touches; k++) {
+    const edge_spot a = w->touch[k], b = w->touch[k + 1];
+    if (a.edge != b.edge || both_on_edge(w, w->side, w->t, a.spot, b.spot) || !edge_is_present(w, other_side(w), a.edge)) continue;
+    RM_TRY(push_arc(w, (arc){a.spot, b.spot, RM_UNKNOWN, RM_UNKNOWN}));
+  }
+  return REMAP_OK;
+}
+
+static int by_ends(const void *a, const void *b)
+{
+  const arc *x = a, *y = b;
+  if (x->from != y->from) return x->from < y->from ? -1 : 1;
+  if (x->to != y->to) return x->to < y->to ? -1 : 1;
+  return (x->left > y->left) - (x->left < y->left);
+}
+
+/* Arcs that several triangles of the other mesh make are one. */
+static remap_status inner_arcs(work *w)
+{
+  w->num_arcs = 0;
+  RM_TRY(segments(w));
+  RM_TRY(edges_in_plane(w));
+  if (w->num_arcs > 1) qsort(w->arc, (size_t)w->num_arcs, sizeof *w->arc, by_ends);
+  for (rm_lid k = 0; k < w->num_arcs; k++) {
+    const arc *a = &w->arc[k];
+    if (k && a->from == a[-1].from && a->to == a[-1].to) continue;
+    RM_TRY(add_arc(w, a->from, a->to, a->left, a->right));
+  }
+  return REMAP_OK;
+}
+
+/* ---- walks ------------------------------------------------------------------------------------------------------------------ */
+
+static inline rm_lid end_of(const work *w, rm_lid h) { return w->half[h ^ 1].from; }
+
+/* Order the halves that leave a node counter-clockwise, from the first of them on. */
+static void order_around(const work *w, rm_lid *list, rm_lid n)
+{
+  const rm_lid p = w->spot[w->half[list[0]].from], reference = w->spot[end_of(w, list[0])];
+
+  for (rm_lid i = 2; i < n; i++) {
+    const rm_lid x = list[i], q = w->spot[end_of(w, x)];
+    const int    turn = rm_turn(&w->view, p, reference, q);
+    rm_lid       k = i;
+    while (k > 1) {
+      const rm_lid r = w->spot[end_of(w, list[k - 1])];
+      const int    other = rm_turn(&w->view, p, reference, r);
+      const bool   before = turn == other ? rm_turn(&w->view, p, q, r) > 0 : turn > other; /* left, straight back, right */
+      if (!before) break;
+      list[k] = list[k - 1];
+      k--;
+    }
+    list[k] = x;
+  }
+}
+
+static remap_status link_halves(work *w)
+{
+  rm_lid *offset;
+
+  RM_TRY(rm_grow(&w->degree_offset, &w->degree_room, (int64_t)w->num_nodes + 2, sizeof *w->degree_offset));
+  RM_TRY(rm_grow(&w->around, &w->around_room, w->num_halves, sizeof *w->around));
+  offset = w->degree_offset;
+  memset(offset, 0, sizeof *offset * ((size_t)w->num_nodes + 2));
+  for (rm_lid h = 0; h < w->num_halves; h++) offset[w->half[h].from + 2]++;
+  for (rm_lid k = 0; k < w->num_nodes; k++) offset[k + 2] += offset[k + 1];
+  for (rm_lid h = 0; h < w->num_halves; h++) w->around[offset[w->half[h].from + 1]++] = h;
+  for (rm_lid k = 0; k < w->num_nodes; k++) {
+    rm_lid      *list = w->around + offset[k];
+    const rm_lid n    = offset[k + 1] - offset[k];
+    if (n > 2) order_around(w, list, n);
+    for (rm_lid i = 0; i < n; i++) w->half[list[(i + 1) % n] ^ 1].next = list[i];
+  }
+  return REMAP_OK;
+}
+
+/* Twice the area of a cycle, rounded. */
+static double cycle_area(const work *w, rm_lid first)
+{
+  const double *o = w->l->xyz[w->spot[w->half[first].from]];
+  double        area = 0;
+  rm_lid        h = first;
+
+  do {
+    const double *p = w->l->xyz[w->spot[w->half[h].from]], *q = w->l->xyz[w->spot[end_of(w, h)]];
+    const int     x = w->view.x, y = w->view.y;
+    area += (p[x] - o[x]) * (q[y] - o[y]) - (p[y] - o[y]) * (q[x] - o[x]);
+    h = w->half[h].next;
+  } while (h != first);
+  return w->view.flip * area;
+}
+
+static remap_status walk_cycles(work *w)
+{
+  w->num_cycles = 0;
+  for (rm_lid first = 0; first < w->num_halves; first++) {
+    cycle  c = {first, 0, RM_UNKNOWN, 0, -1, 0};
+    rm_lid h = first;
+
+    if (w->half[first].cycle != NOT_CALLED) continue;
+    do {
+      if (w->half[h].cycle != NOT_CALLED) return tangled(w);
+      w->half[h].cycle = w->num_cycles;
+      c.num++;
+      if (w->half[h].state != RM_UNKNOWN) {
+        if (c.state != RM_UNKNOWN && c.state != w->half[h].state) return tangled(w);
+        c.state = w->half[h].state;
+      }
+      h = w->half[h].next;
+    } while (h != first);
+    RM_TRY(rm_grow(&w->cycle, &w->cycle_room, (int64_t)w->num_cycles + 1, sizeof *w->cycle));
+    w->cycle[w->num_cycles++] = c;
+  }
+  return REMAP_OK;
+}
+
+/* ---- parts of the graph that hang together, holes ----------------------------------------------------------------------------- */
+
+static rm_lid root(rm_lid *parent, rm_lid k)
+{
+  while (parent[k] != k) k = parent[k] = parent[parent[k]];
+  return k;
+}
+
+/* True if spot p is inside a cycle that it is not on: crossings of the ray from it along the view's first axis. Exact. */
+static bool is_inside(const work *w, rm_lid p, rm_lid first)
+{
+  const rm_limit *l = w->l;
+  bool            inside = false;
+  rm_lid          h = first;
+
+  do {
+    const rm_lid a = w->spot[w->half[h].from], b = w->spot[end_of(w, h)];
+    const bool   above_a = rm_compare(l, a, p, w->view.y) > 0, above_b = rm_compare(l, b, p, w->view.y) > 0;
+    if (above_a != above_b) {
+      const int turn = w->view.flip * rm_turn(&w->view, a, b, p); /* counter-clockwise in the axes */
+      if (above_b ? turn > 0 : turn < 0) inside = !inside;
+    }
+    h = w->half[h].next;
+  } while (h != first);
+  return inside;
+}
+
+/* The cycle around each part of the graph apart from the boundary is a hole of the smallest polygon that it lies in. */
+static remap_status find_holes(work *w, bool *any)
+{
+  rm_lid *parent;
+
+  *any = false;
+  RM_TRY(rm_grow(&w->component, &w->component_room, w->num_nodes, sizeof *w->component));
+  parent = w->component;
+  for (rm_lid k = 0; k < w->num_nodes; k++) parent[k] = k;
+  for (rm_lid h = 0; h < w->num_halves; h += 2) {
+    const rm_lid a = root(parent, w->half[h].from), b = root(parent, end_of(w, h));
+    if (a < b) parent[b] = a;
+    else parent[a] = b;
+  }
+  for (rm_lid k = 0; k < w->num_nodes; k++) *any = *any || root(parent, k) != 0;
+  if (!*any) return REMAP_OK;
+  for (rm_lid c = 0; c < w->num_cycles; c++) {
+    w->cycle[c].component = root(parent, w->half[w->cycle[c].half].from);
+    w->cycle[c].area      = cycle_area(w, w->cycle[c].half);
+  }
+  for (rm_lid k = 1; k < w->num_nodes; k++) {
+    rm_lid hole = -1;
+    if (parent[k] != k) continue;
+    for (rm_lid c = 0; c < w->num_cycles; c++)
+      if (w->cycle[c].component == k && (hole < 0 || w->cycle[c].area < w->cycle[hole].area)) hole = c;
+    w->cycle[hole].inside = w->num_cycles;
+  }
+  for (rm_lid hole = 0; hole < w->num_cycles; hole++) {
+    rm_lid around = -1;
+    if (w->cycle[hole].inside < 0) continue;
+    for (rm_lid c = 0; c < w->num_cycles; c++) {
+      if (w->cycle[c].inside >= 0 || w->cycle[c].component == w->cycle[hole].component) continue;
+      if (around >= 0 && w->cycle[c].area >= w->cycle[around].area) continue;
+      if (is_inside(w, w->spot[w->half[w->cycle[hole].half].from], w->cycle[c].half)) around = c;
+    }
+    if (around < 0) return tangled(w);
+    w->cycle[hole].inside = around;
+    if (w->cycle[around].state == RM_UNKNOWN) w->cycle[around].state = w->cycle[hole].state;
+  }
+  return REMAP_OK;
+}
+
+/* ---- where a polygon lies in the other mesh -------------------------------------------------------------------------------------- */
+
+/* A corner of the triangle on the left of the line from a to b in its plane. */
+static const double *corner_left_of(const work *w, const double a[3], const double b[3])
+{
+  const rm_trimesh *m = w->l->o->mesh[w->side];
+  const rm_lid     *v = m->triangle[w->t];
+  double            o[3];
+
+  rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
+  for (int h = 0; h < 3; h++)
+    if (rm_orient3d(a, b, m->vertex[v[h]], o) > 0) return m->vertex[v[h]];
+  return NULL;
+}
+
+/* True if x and y, in one plane with the line f0 f1, are on the same side of it. */
+static bool same_side(const double f0[3], const double f1[3], const double x[3], const double y[3])
+{
+  double o[3];
+  return rm_off_plane(f0, f1, x, o) && rm_orient3d(o, f0, f1, x) == rm_orient3d(o, f0, f1, y);
+}
+
+/* The half-plane from f to x among the triangles of the other mesh around edge f: the triangle it lies in, or the cell. */
+static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *triangle, rm_lid *cell)
+{
+  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]], *nearest = NULL;
+  int               nearest_quarter = 0;
+
+  *triangle = -1;
+  for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
+    const rm_lid  b = m->star[z] / 4;
+    const int     h = m->star[z] & 3;
+    const double *y = m->vertex[m->triangle[b][h == 0 ? 2 : h == 1 ? 0 : 1]];
+    int           quarter;
+
+    if (!rm_is_present(w->l, other_side(w), b)) continue;
+    const int s = rm_orient3d(f0, f1, x, y);
+    if (s == 0 && same_side(f0, f1, x, y)) {
+      *triangle = b;
+      return true;
+    }
+    quarter = s > 0 ? 0 : s == 0 ? 1 : 2;
+    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0))) continue;
+    nearest         = y;
+    nearest_quarter = quarter;
+    *cell           = w->l->cell[other_side(w)][b][h == 2 ? 1 : 0]; /* the side that is met first, turning about f */
+  }
+  return nearest != NULL;
+}
+
+/* Of a polygon that has no arc with a state: all its arcs lie on triangles of the other mesh. */
+static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *state)
+{
+  const rm_trimesh *own = w->l->o->mesh[w->side], *other = w->l->o->mesh[other_side(w)];
+  const rm_lid      p = w->spot[w->half[c->half].from], q = w->spot[end_of(w, c->half)];
+  rm_lid            b, f;
+
+  *triangle = -1;
+  if (!carrier(w, other_side(w), p, q, &b, &f)) return tangled(w);
+  if (f >= 0) {
+    const double *f0 = other->vertex[other->edge[f][0]], *f1 = other->vertex[other->edge[f][1]];
+    int           k = 0, sign = 0;
+    for (; k < 3 && !sign; k++) /* the direction of the arc along f */
+      if (f0[k] != f1[k]) sign = rm_compare(w->l, q, p, k) * (f1[k] > f0[k] ? 1 : -1);
+    const double *x = sign > 0 ? corner_left_of(w, f0, f1) : corner_left_of(w, f1, f0);
+    if (!x || !place_around(w, f, x, triangle, state)) return tangled(w);
+    return REMAP_OK;
+  }
+  /* the arc runs through the inside of b: along an edge of this triangle, whose far corner is off that edge */
+  for (int h = 0; h < 3; h++) {
+    const rm_lid e = own->triangle_edge[w->t][h];
+    if (!rm_on_edge(w->l, w->side, p, e) || !rm_on_edge(w->l, w->side, q, e)) continue;
+    const double *x = own->vertex[own->triangle[w->t][h == 0 ? 2 : h == 1 ? 0 : 1]];
+    const rm_lid *v = other->triangle[b];
+    const int     s = rm_orient3d(other->vertex[v[0]], other->vertex[v[1]], other->vertex[v[2]], x);
+    if (s == 0) *triangle = b;
+    else *state = w->l->cell[other_side(w)][b][s > 0];
+    return REMAP_OK;
+  }
+  return tangled(w);
+}
+
+/* True if the normals of coplanar triangles t of `side` and b of the other mesh point the same way. */
+static bool same_way(const work *w, rm_lid b)
+{
+  const rm_trimesh *own = w->l->o->mesh[w->side], *other = w->l->o->mesh[other_side(w)];
+  const rm_lid     *v = own->triangle[w->t], *u = other->triangle[b];
+  double            o[3];
+
+  rm_off_plane(own->vertex[v[0]], own->vertex[v[1]], own->vertex[v[2]], o);
+  return rm_orient3d(other->vertex[u[0]], other->vertex[u[1]], other->vertex[u[2]], o) > 0;
+}
+
+/* ---- output ---------------------------------------------------------------------------------------------------------------------- */
+
+static remap_status push_vertex(rm_polygons *out, rm_lid spot)
+{
+  RM_TRY(rm_grow(&out->vertex, &out->vertex_room, out->num_vertices + 1, sizeof *out->vertex));
+  out->vertex[out->num_vertices++] = spot;
+  return REMAP_OK;
+}
+
+/* Finish a polygon whose vertices are those from `first` on. */
+static remap_status push_polygon(work *w, int64_t first, rm_lid b, rm_lid state)
+{
+  rm_polygons  *out = w->out;
+  const rm_lid *own = w->l->cell[w->side][w->t];
+  rm_polygon    g   = {first, (rm_lid)(out->num_vertices - first), {-1, -1}, {{{0, 0}}, {{0, 0}}}};
+
+  g.triangle[w->side]       = w->t;
+  g.triangle[other_side(w)] = b;
+  for (int h = 0; h < 2; h++) {
+    g.label[h].cell[w->side]       = own[h];
+    g.label[h].cell[other_side(w)] = b < 0 ? state : w->l->cell[other_side(w)][b][same_way(w, b) ? h : 1 - h];
+  }
+  RM_TRY(rm_grow(&out->polygon, &out->room, out->num + 1, sizeof *out->polygon));
+  out->polygon[out->num++] = g;
+  return REMAP_OK;
+}
+
+static remap_status push_loop(work *w, const cycle *c, rm_polygons *to)
+{
+  rm_lid h = c->half;
+
+  do {
+    RM_TRY(push_vertex(to, w->spot[w->half[h].from]));
+    h = w->half[h].next;
+  } while (h != c->half);
+  return REMAP_OK;
+}
+
+static remap_status push_with_holes(work *w, rm_lid around, rm_lid b, rm_lid state)
+{
+  rm_polygons  loops = {0};
+  int64_t     *offset = rm_arena_alloc(w->scratch, (int64_t)w->num_cycles + 1, sizeof *offset), num = 0;
+  rm_lid      *corner = NULL;
+  int          n = 0;
+  remap_status status = offset ? REMAP_OK : REMAP_NO_MEMORY;
+
+  for (rm_lid c = -1; c < w->num_cycles && status == REMAP_OK; c++) {
+    if (c >= 0 && w->cycle[c].inside != around) continue;
+    offset[n++] = loops.num_vertices;
+    status      = push_loop(w, &w->cycle[c < 0 ? around : c], &loops);
+  }
+  if (status == REMAP_OK) {
+    offset[n] = loops.num_vertices;
+    status    = rm_cut_holes(w->scratch, &w->view, n, offset, loops.vertex, &corner, &num);
+    if (status == REMAP_BAD_MESH) status = tangled(w);
+  }
+  for (int64_t k = 0; k < num && status == REMAP_OK; k++) {
+    const int64_t first = w->out->num_vertices;
+    for (int h = 0; h < 3 && status == REMAP_OK; h++) status = push_vertex(w->out, corner[3 * k + h]);
+    if (status == REMAP_OK) status = push_polygon(w, first, b, state);
+  }
+  free(loops.vertex);
+  return status;
+}
+
+static remap_status one_triangle(work *w)
+{
+  bool         holes;
+  remap_status status = REMAP_OK;
+
+  w->num_nodes = w->num_halves = 0;
+  RM_TRY(boundary(w));
+  RM_TRY(inner_arcs(w));
+  w->view = rm_view_of(w->l, w->side, w->t);
+  RM_TRY(link_halves(w));
+  RM_TRY(walk_cycles(w));
+  RM_TRY(find_holes(w, &holes));
+  for (rm_lid k = 0; k < w->num_cycles && status == REMAP_OK; k++) {
+    const cycle *c = &w->cycle[k];
+    rm_lid       b = -1, state = c->state;
+    bool         has_hole = false;
+
+    if (c->inside >= 0) continue;
+    if (c->num < 3) return tangled(w);
+    if (state == RM_UNKNOWN) RM_TRY(locate(w, c, &b, &state));
+    if (b >= 0 && w->side == 1) continue;
+    for (rm_lid h = 0; h < w->num_cycles && holes; h++) has_hole = has_hole || w->cycle[h].inside == k;
+    if (has_hole) {
+      status = push_with_holes(w, k, b, state);
+      continue;
+    }
+    const int64_t first = w->out->num_vertices;
+    RM_TRY(push_loop(w, c, w->out));
+    status = push_polygon(w, first, b, state);
+  }
+  for (rm_lid k = 0; k < w->num_nodes; k++) w->node_of[w->spot[k]] = NOT_CALLED;
+  return status;
+}
+
+static remap_status all_triangles(work *w)
+{
+  RM_TRY(file_segments(w));
+  RM_NEW(w->node_of, w->scratch, w->l->num_spots);
+  for (rm_lid p = 0; p < w->l->num_spots; p++) w->node_of[p] = NOT_CALLED;
+  for (w->side = 0; w->side < 2; w->side++)
+    for (w->t = 0; w->t < w->l->o->mesh[w->side]->num_triangles; w->t++)
+      if (rm_is_present(w->l, w->side, w->t)) RM_TRY(one_triangle(w));
+  return REMAP_OK;
+}
+
+remap_status rm_polygons_build(rm_arena *scratch, const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason)
+{
+  work               w = {.scratch = scratch, .part = part, .l = l, .reason = reason, .out = out};
+  const remap_status status = all_triangles(&w);
+
+  free(w.spot);
+  free(w.degree_offset);
+  free(w.around);
+  free(w.component);
+  free(w.half);
+  free(w.arc);
+  free(w.cycle);
+  free(w.touch);
+  return status;
+}

@@ -1,0 +1,196 @@
+/* spots -- exact signs of vertices of the supermesh. A spot that is no vertex of a mesh is the meeting of a line with a plane, both
+ * through points in doubles: rational coordinates, numerators of degree 4 over denominators of degree 3. Doubles with their error
+ * bounds decide nearly always (10 ns); integers (exact.h) the rest (a few us). */
+#include "cells/cells_private.h"
+
+#include <math.h>
+#include <string.h>
+#include "geom/exact.h"
+
+bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3])
+{
+  double n[3];
+  int    axis[3] = {0, 1, 2};
+
+  for (int k = 0; k < 3; k++) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    n[k] = fabs((b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]));
+  }
+  for (int k = 2; k > 0; k--)
+    for (int h = 0; h < k; h++)
+      if (n[axis[h]] < n[axis[h + 1]]) { const int s = axis[h]; axis[h] = axis[h + 1], axis[h + 1] = s; }
+  for (int k = 0; k < 3; k++) {
+    memcpy(o, a, 3 * sizeof *o);
+    o[axis[k]] += 1;
+    const int side = rm_orient3d(a, b, c, o);
+    if (side < 0) o[axis[k]] = a[axis[k]] - 1;
+    if (side) return true;
+  }
+  return false;
+}
+
+void rm_vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3], double plane[3][3])
+{
+  const double *p0 = own->vertex[own->edge[e][0]], *p1 = own->vertex[own->edge[e][1]];
+  int           k = 0;
+
+  for (int c = 1; c < 3; c++)
+    if (fabs(p1[c] - p0[c]) > fabs(p1[k] - p0[k])) k = c;
+  for (int h = 0; h < 3; h++) memcpy(plane[h], vertex, sizeof plane[h]);
+  plane[1][(k + 1) % 3] += 1;
+  plane[2][(k + 2) % 3] += 1;
+}
+
+static void copy_point(double to[3], const rm_trimesh *m, rm_lid v) { memcpy(to, m->vertex[v], 3 * sizeof *to); }
+
+bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3])
+{
+  for (int side = 0; side < 2; side++)
+    if (spot->at[side].kind == RM_ON_VERTEX) {
+      copy_point(line[0], o->mesh[side], spot->at[side].id);
+      return false;
+    }
+  const int         own  = spot->at[0].kind == RM_ON_EDGE ? 0 : 1;
+  const rm_trimesh *m = o->mesh[own], *other = o->mesh[1 - own];
+  const rm_feature  f    = spot->at[1 - own];
+
+  for (int h = 0; h < 2; h++) copy_point(line[h], m, m->edge[spot->at[own].id][h]);
+  if (f.kind == RM_ON_TRIANGLE) {
+    for (int h = 0; h < 3; h++) copy_point(plane[h], other, other->triangle[f.id][h]);
+  } else {
+    for (int h = 0; h < 2; h++) copy_point(plane[h], other, other->edge[f.id][h]);
+    const bool found = rm_off_plane(plane[0], plane[1], line[0], plane[2]) || rm_off_plane(plane[0], plane[1], line[1], plane[2]);
+    RM_ASSERT(found);
+    (void)found;
+  }
+  return true;
+}
+
+/* ---- integers ------------------------------------------------------------------------------------------------------ */
+
+/* Coordinates num / den: num at scale degree + 1, den at scale degree. */
+typedef struct rational {
+  rm_int num[3], den;
+} rational;
+
+typedef struct meeting {
+  double line[2][3], plane[3][3];
+  bool   crosses;
+} meeting;
+
+static int scale_of(const rm_limit *l, int n, const rm_lid spot[], meeting out[])
+{
+  const double *point[15];
+  int           num = 0;
+
+  for (int k = 0; k < n; k++) {
+    out[k].crosses = rm_spot_meeting(l->o, &l->spot[spot[k]], out[k].line, out[k].plane);
+    point[num++]   = out[k].line[0];
+    if (!out[k].crosses) continue;
+    point[num++] = out[k].line[1];
+    for (int h = 0; h < 3; h++) point[num++] = out[k].plane[h];
+  }
+  return rm_int_scale(num, point);
+}
+
+static void to_rational(const meeting *m, int scale, rational *r)
+{
+  rm_int u[3], a[3], b[3], d[3], n[3], num, x, y;
+
+  if (!m->crosses) {
+    for (int k = 0; k < 3; k++) rm_int_from_double(&r->num[k], m->line[0][k], scale);
+    rm_int_from_double(&r->den, 1, 0);
+    return;
+  }
+  for (int k = 0; k < 3; k++) {
+    rm_int_from_difference(&u[k], m->line[1][k], m->line[0][k], scale);
+    rm_int_from_difference(&a[k], m->plane[1][k], m->plane[0][k], scale);
+    rm_int_from_difference(&b[k], m->plane[2][k], m->plane[0][k], scale);
+    rm_int_from_difference(&d[k], m->plane[0][k], m->line[0][k], scale);
+  }
+  rm_int_cross(n, a, b);
+  rm_int_dot(&num, n, d);
+  rm_int_dot(&r->den, n, u);
+  for (int k = 0; k < 3; k++) {
+    rm_int p0;
+    rm_int_from_double(&p0, m->line[0][k], scale);
+    rm_int_mul(&x, &p0, &r->den);
+    rm_int_mul(&y, &num, &u[k]);
+    rm_int_add(&r->num[k], &x, &y);
+  }
+}
+
+static __attribute__((noinline)) int exact_turn(const rm_view *v, const rm_lid spot[3])
+{
+  meeting   m[3];
+  rational  r[3];
+  rm_int    minor, term, sum = {0};
+  const int scale = scale_of(v->l, 3, spot, m);
+  int       sign = 1;
+
+  for (int k = 0; k < 3; k++) {
+    to_rational(&m[k], scale, &r[k]);
+    sign *= rm_int_sign(&r[k].den);
+  }
+  for (int k = 0; k < 3; k++) {
+    const rational *a = &r[(k + 1) % 3], *b = &r[(k + 2) % 3];
+    rm_int_minor(&minor, &a->num[v->x], &b->num[v->y], &a->num[v->y], &b->num[v->x]);
+    rm_int_mul(&term, &minor, &r[k].den);
+    rm_int_add(&sum, &sum, &term);
+  }
+  return sign * rm_int_sign(&sum);
+}
+
+static __attribute__((noinline)) int exact_compare(const rm_limit *l, const rm_lid spot[2], int axis)
+{
+  meeting   m[2];
+  rational  r[2];
+  rm_int    diff;
+  const int scale = scale_of(l, 2, spot, m);
+
+  for (int k = 0; k < 2; k++) to_rational(&m[k], scale, &r[k]);
+  rm_int_minor(&diff, &r[0].num[axis], &r[1].den, &r[1].num[axis], &r[0].den);
+  return rm_int_sign(&diff) * rm_int_sign(&r[0].den) * rm_int_sign(&r[1].den);
+}
+
+/* ---- doubles first ------------------------------------------------------------------------------------------------- */
+
+rm_view rm_view_of(const rm_limit *l, int side, rm_lid t)
+{
+  const rm_trimesh *m = l->o->mesh[side];
+  const double     *a = m->vertex[m->triangle[t][0]], *b = m->vertex[m->triangle[t][1]], *c = m->vertex[m->triangle[t][2]];
+  double            o[3];
+  int               k = 0;
+
+  const bool found = rm_off_plane(a, b, c, o);
+  RM_ASSERT(found);
+  (void)found;
+  for (int h = 1; h < 3; h++)
+    if (o[h] != a[h]) k = h;
+  return (rm_view){l, (k + 1) % 3, (k + 2) % 3, o[k] > a[k] ? 1 : -1};
+}
+
+int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r)
+{
+  const double *a = v->l->xyz[p], *b = v->l->xyz[q], *c = v->l->xyz[r];
+  const double  ux = b[v->x] - a[v->x], uy = b[v->y] - a[v->y], vx = c[v->x] - a[v->x], vy = c[v->y] - a[v->y];
+  const double  left = ux * vy, right = uy * vx, det = left - right;
+  const double  e = v->l->error[p] + v->l->error[q] + v->l->error[r];
+  const double  bound = 0x1p-50 * (fabs(left) + fabs(right)) + 2 * e * (fabs(ux) + fabs(uy) + fabs(vx) + fabs(vy) + e);
+
+  if (det > bound) return v->flip;
+  if (det < -bound) return -v->flip;
+  if (bound == 0) return 0;
+  return v->flip * exact_turn(v, (const rm_lid[3]){p, q, r});
+}
+
+int rm_compare(const rm_limit *l, rm_lid p, rm_lid q, int axis)
+{
+  const double diff = l->xyz[p][axis] - l->xyz[q][axis], bound = 2 * (l->error[p] + l->error[q]);
+
+  if (p == q) return 0;
+  if (diff > bound) return 1;
+  if (diff < -bound) return -1;
+  if (bound == 0) return 0;
+  return exact_compare(l, (const rm_lid[2]){p, q}, axis);
+}
