@@ -111,7 +111,7 @@ static void homogeneous(const rm_overlay *o, const corner *c, const double *vert
 static bool is_same(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
 
 /* The polygon's area, for pairs that are in doubt. */
-void rm_moments_add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
+static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, const point *p, const point *q)
 {
   slot         *s = &w->slots[w->slot_of[j]];
   const double *n = pl->n;
@@ -120,7 +120,6 @@ void rm_moments_add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, 
   polygon      *g = NULL;
   corner       *c;
 
-  (void)i, (void)kind;
   if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK) return;
   for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next)
     if (w->polygon[k].triangle == pl->triangle && w->polygon[k].mesh == pl->mesh) {
@@ -147,6 +146,13 @@ void rm_moments_add_polygon(work *w, rm_lid i, rm_lid j, int kind, double sign, 
   g->first_corner = w->num_corners++;
   g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
   g->num_cones++;
+}
+
+void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+{
+  (void)i, (void)kind;
+  for (int h = 0; h < 2; h++)
+    if (j[h] >= 0) add_polygon_side(w, j[h], h ? -sign : sign, pl, p, q);
 }
 
 /* All corners of a polygon have their limits on one line. Exact. */

@@ -1,12 +1,13 @@
 /* moments -- volumes and moments of all pairs, from segments and pieces of edges (DESIGN 2.4, 2.6).
  *
- * The boundary of i n j consists of polygons in the triangles of i and of j. Each polygon contributes the cone over it from a local
- * origin O, the centre of the meeting of the two cells' boxes, summed over the polygon's sides p -> q: the signed volume of the
- * tetrahedron (O, r, p, q), with r the foot of the perpendicular from O on the triangle's plane. All terms are of the size of the
- * pair, wherever it lies and however large its cells are. A point is its edge's first vertex plus lambda times the edge, and is
- * taken relative to O before anything is multiplied.
+ * The boundary of i n j consists of polygons in the triangles of i and of j. Each polygon contributes the cone over it from an origin
+ * O, summed over the polygon's sides p -> q: the signed volume of the tetrahedron (O, r, p, q), with r the foot of the perpendicular
+ * from O on the triangle's plane. O is the centre of the box of cell i, and what j gains its neighbour beyond the polygon loses, so
+ * that one product serves both; where j is much smaller than i, O is the centre of the meeting of their boxes. So all terms are of
+ * the size of the smaller cell, wherever it lies. A point is its edge's first vertex plus lambda times the edge, and is taken relative
+ * to O before anything is multiplied.
  *
- * Cost: four cones per segment and cell beside it, two per piece of an edge and triangle at it; 45 operations per cone. */
+ * Cost: two cones per segment and cell beside it in mesh 1, one per piece of an edge and triangle at it; 40 operations per cone. */
 #include "moments/moments_private.h"
 
 #include <math.h>
@@ -14,6 +15,8 @@
 #include <string.h>
 
 /* ---- slots ------------------------------------------------------------------------------------------------------- */
+
+enum { MUCH_SMALLER = 4 }; /* times smaller a cell of mesh 2 has an origin of its own with cell i */
 
 static slot *new_slot(work *w, rm_lid i, rm_lid j)
 {
@@ -24,8 +27,11 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
   s = &w->slots[w->num_slots];
   memset(s, 0, sizeof *s);
   s->target        = j;
-  s->first_polygon = -1;
-  for (int c = 0; c < 3; c++) {
+  s->first_polygon = NO_POLYGONS;
+  s->is_local      = MUCH_SMALLER * fmax(b[3] - b[0], fmax(b[4] - b[1], b[5] - b[2])) < w->extent;
+  s->reach         = s->is_local ? 0 : w->extent;
+  memcpy(s->o, w->centre, sizeof s->o);
+  for (int c = 0; c < 3 && s->is_local; c++) {
     const double low = a[c] > b[c] ? a[c] : b[c], high = a[c + 3] < b[c + 3] ? a[c + 3] : b[c + 3];
     s->o[c] = low + 0.5 * (high - low);
     if (high - low > s->reach) s->reach = high - low;
@@ -38,189 +44,189 @@ INLINE slot *find_slot(work *w, rm_lid i, rm_lid j) { return w->slot_of[j] >= 0 
 
 /* ---- what a cone adds --------------------------------------------------------------------------------------------- */
 
-/* n.(p x q) for p and q relative to the slot's origin, and the plane's height over it times |n|. */
-INLINE double side_area(const slot *s, const plane *pl, const double p[3], const double q[3], double *height)
+INLINE double triple(const double n[3], const double p[3], const double q[3])
 {
-  const double *n = pl->n, *v = pl->v;
-
-  *height = n[0] * (v[0] - s->o[0]) + n[1] * (v[1] - s->o[1]) + n[2] * (v[2] - s->o[2]);
   return n[0] * (p[1] * q[2] - p[2] * q[1]) + n[1] * (p[2] * q[0] - p[0] * q[2]) + n[2] * (p[0] * q[1] - p[1] * q[0]);
 }
 
-INLINE void add_cone_of_degree(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q,
-                               bool with_second)
-{
-  slot  *s = find_slot(w, i, j);
-  double a[3], b[3], height;
+static const int row_of[6] = {0, 1, 2, 0, 0, 1}, column_of[6] = {0, 1, 2, 1, 2, 2}; /* of second moments */
 
-  if (!s) return;
+/* 6 V, 24 M and, of ten sums, 120 S of the tetrahedron (O, r, p, q), with r = height n. */
+INLINE void cone(const double n[3], double height, const double r[3], const double p[3], const double q[3], double sign, int num_sums,
+                 double out[10])
+{
+  double sum[3];
+
+  out[0] = sign * triple(n, p, q) * height;
+  for (int c = 0; c < 3; c++) {
+    sum[c]     = r[c] + p[c] + q[c];
+    out[1 + c] = out[0] * sum[c];
+  }
+  for (int k = 0; k < num_sums - 4; k++) {
+    const int x = row_of[k], y = column_of[k];
+    out[4 + k] = out[0] * (r[x] * r[y] + p[x] * p[y] + q[x] * q[y] + sum[x] * sum[y]);
+  }
+}
+
+static void add_local(slot *s, double sign, const plane *pl, const point *p, const point *q, int num_sums)
+{
+  double       a[3], b[3], r[3], out[10];
+  const double d[3] = {pl->v[0] - s->o[0], pl->v[1] - s->o[1], pl->v[2] - s->o[2]};
+  const double height = (pl->n[0] * d[0] + pl->n[1] * d[1] + pl->n[2] * d[2]) * pl->inverse;
+
   relative(p, s->o, a);
   relative(q, s->o, b);
-  const double area = side_area(s, pl, a, b, &height), foot = height * pl->inverse, six_v = sign * area * foot;
-  double       r[3], sum[3];
-  s->num_cones++;
-  s->kinds |= kind;
-  s->sum[0] += six_v;
-  for (int c = 0; c < 3; c++) {
-    r[c]   = pl->n[c] * foot;
-    sum[c] = r[c] + a[c] + b[c];
-    s->sum[1 + c] += six_v * sum[c];
+  for (int c = 0; c < 3; c++) r[c] = pl->n[c] * height;
+  cone(pl->n, height, r, a, b, sign, num_sums, out);
+  for (int k = 0; k < num_sums; k++) s->sum[k] += out[k];
+}
+
+INLINE void add_of_degree(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q,
+                          int num_sums)
+{
+  double out[10];
+
+  cone(pl->n, pl->height, pl->foot, p->at, q->at, sign, num_sums, out);
+  for (int h = 0; h < 2; h++) {
+    if (j[h] < 0) continue;
+    slot *s = find_slot(w, i, j[h]);
+    if (!s) return;
+    s->num_cones++;
+    s->kinds |= kind;
+    if (s->is_local) add_local(s, h ? -sign : sign, pl, p, q, num_sums);
+    else
+      for (int k = 0; k < num_sums; k++) s->sum[k] += h ? -out[k] : out[k];
   }
-  if (with_second)
-    for (int k = 0; k < 6; k++) {
-      static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-      const int        x = row[k], y = column[k];
-      s->sum[4 + k] += six_v * (r[x] * r[y] + a[x] * a[y] + b[x] * b[y] + sum[x] * sum[y]);
-    }
 }
 
-INLINE void add_cone(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
+INLINE void add(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
 {
-  add_cone_of_degree(w, i, j, kind, sign, pl, p, q, false);
+  add_of_degree(w, i, j, kind, sign, pl, p, q, 4);
 }
-INLINE void add_cone_2(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
+INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
 {
-  add_cone_of_degree(w, i, j, kind, sign, pl, p, q, true);
-}
-
-/* ---- enumeration of the cones of cell i ---------------------------------------------------------------------------- */
-
-INLINE point vertex_point(const rm_trimesh *m, rm_lid v) { return (point){m->vertex[v], {0, 0, 0}, 0, -1, -1}; }
-
-INLINE point crossing_point(const rm_overlay *o, int mesh, rm_lid e, int64_t x)
-{
-  const rm_trimesh  *m = o->mesh[mesh];
-  const rm_crossing *c = &o->trace[mesh].crossing[x];
-  const double      *v = m->vertex[m->edge[e][0]], *u = m->vertex[m->edge[e][1]];
-  const double       l = c->lambda;
-
-  return (point){v, {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])}, mesh, e, c->triangle / 2};
+  add_of_degree(w, i, j, kind, sign, pl, p, q, 10);
 }
 
-/* Ends of piece k of edge e, and the state in which it lies. */
-INLINE rm_lid piece_ends(const rm_overlay *o, int mesh, rm_lid e, rm_lid k, point *p, point *q)
-{
-  const rm_trace *t = &o->trace[mesh];
-  const int64_t   x = t->first[e] + k;
+/* ---- enumeration of the polygons' sides in cell i ------------------------------------------------------------------- */
 
-  *p = k == 0 ? vertex_point(o->mesh[mesh], o->mesh[mesh]->edge[e][0]) : crossing_point(o, mesh, e, x - 1);
-  *q = k == t->count[e] ? vertex_point(o->mesh[mesh], o->mesh[mesh]->edge[e][1]) : crossing_point(o, mesh, e, x);
-  return k == 0 ? t->state[e] : t->crossing[x - 1].state;
+INLINE point vertex_point(const work *w, const rm_trimesh *m, rm_lid v)
+{
+  point p = {m->vertex[v], {0, 0, 0}, {0, 0, 0}, 0, -1, -1};
+
+  for (int c = 0; c < 3; c++) p.at[c] = p.base[c] - w->centre[c];
+  return p;
 }
 
-INLINE plane plane_of(const rm_overlay *o, int mesh, rm_lid t)
+INLINE point crossing_point(const work *w, int mesh, const rm_crossing *x)
 {
-  const rm_trimesh *m = o->mesh[mesh];
-  const double     *n = m->normal[t];
-  const double      square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+  const rm_trimesh *m = w->o->mesh[mesh];
+  const double     *v = m->vertex[m->edge[x->edge][0]], *u = m->vertex[m->edge[x->edge][1]], l = x->lambda;
+  point             p = {v, {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])}, {0, 0, 0}, mesh, x->edge, x->triangle / 2};
 
-  return (plane){mesh, t, n, m->vertex[m->triangle[t][0]], square > 0 ? 1 / square : 0};
+  relative(&p, w->centre, p.at);
+  return p;
 }
 
-/* The edge on which an end of a segment on triangles t and b lies is found again from its crossing: the edge of b (or t) that has
- * it. Edges of a triangle are three. */
-INLINE rm_lid edge_of_crossing(const rm_overlay *o, int mesh, rm_lid triangle, int64_t x)
+INLINE plane plane_of(const work *w, int mesh, rm_lid t)
 {
-  const rm_trace *t = &o->trace[mesh];
-  const rm_lid   *e = o->mesh[mesh]->triangle_edge[triangle];
+  const rm_trimesh *m = w->o->mesh[mesh];
+  const double     *n = m->normal[t], *v = m->vertex[m->triangle[t][0]], *o = w->centre;
+  const double      square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], inverse = square > 0 ? 1 / square : 0;
+  const double      height = (n[0] * (v[0] - o[0]) + n[1] * (v[1] - o[1]) + n[2] * (v[2] - o[2])) * inverse;
 
-  for (int h = 0; h < 2; h++)
-    if (x >= t->first[e[h]] && x < t->first[e[h]] + t->count[e[h]]) return e[h];
-  return e[2];
-}
-
-INLINE point end_point(const rm_overlay *o, rm_lid t, rm_end end)
-{
-  const int     mesh = end.at >> 1 & 1;
-  const int64_t x    = end.at >> 2;
-
-  return crossing_point(o, mesh, edge_of_crossing(o, mesh, mesh ? end.other : t, x), x);
+  return (plane){mesh, t, n, v, inverse, {n[0] * height, n[1] * height, n[2] * height}, height};
 }
 
 /* Segments in triangle t of cell i, which lies on its left (g = 1) or right (g = -1). */
-INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add)
+INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_side)
 {
-  const rm_overlay *o  = w->o;
-  const rm_trimesh *m2 = o->mesh[1];
+  const rm_overlay *o    = w->o;
+  const int         skin = FROM_BOTH | (o->mesh[0]->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
 
   for (int64_t k = o->end_offset[pt->triangle]; k < o->end_offset[pt->triangle + 1]; k += 2) {
-    const rm_lid b    = o->end[k].other;
-    const point  p    = end_point(o, pt->triangle, o->end[k]), q = end_point(o, pt->triangle, o->end[k + 1]);
-    const plane  pb   = plane_of(o, 1, b);
-    const int    kind = FROM_BOTH | (o->mesh[0]->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0) | (m2->triangle_is_skin[b] ? SKIN_TARGET : 0);
+    const rm_end start = o->end[k], end = o->end[k + 1];
+    const rm_lid b     = start.other;
+    const point  p     = crossing_point(w, start.at >> 1 & 1, &o->trace[start.at >> 1 & 1].crossing[start.at >> 2]);
+    const point  q     = crossing_point(w, end.at >> 1 & 1, &o->trace[end.at >> 1 & 1].crossing[end.at >> 2]);
+    const plane  pb    = plane_of(w, 1, b);
+    const int    kind  = skin | (o->mesh[1]->triangle_is_skin[b] ? SKIN_TARGET : 0);
 
-    for (int h = 0; h < 2; h++) {
-      const rm_lid j = m2->side[b][h];
-      const double s = h ? -g : g;
-      if (j < 0) continue;
-      add(w, i, j, kind, s, pt, &p, &q);
-      add(w, i, j, kind, -s, &pb, &p, &q);
-    }
+    add_side(w, i, o->mesh[1]->side[b], kind, g, pt, &p, &q);
+    add_side(w, i, o->mesh[1]->side[b], kind, -g, &pb, &p, &q);
   }
 }
 
 /* Pieces of the edges of triangle t, which bound its polygons in the cells of mesh 2. */
-INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *add)
+INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *add_side)
 {
-  const rm_overlay *o  = w->o;
-  const rm_trace   *tr = &o->trace[0];
-  const int         kind = FROM_SOURCE | (o->mesh[0]->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
+  const rm_trimesh *m    = w->o->mesh[0];
+  const rm_trace   *tr   = &w->o->trace[0];
+  const int         kind = FROM_SOURCE | (m->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
 
   for (int h = 0; h < 3; h++) {
-    const rm_lid e = o->mesh[0]->triangle_edge[pt->triangle][h];
+    const rm_lid e = m->triangle_edge[pt->triangle][h], count = tr->count[e];
     const double s = h == 2 ? -g : g;
+    point        p = vertex_point(w, m, m->edge[e][0]);
+    rm_lid       in[2] = {tr->state[e], RM_OUTSIDE};
 
-    for (rm_lid k = 0; k <= tr->count[e]; k++) {
-      point        p, q;
-      const rm_lid state = piece_ends(o, 0, e, k, &p, &q);
-      if (state >= 0) {
-        add(w, i, state, kind, s, pt, &p, &q);
-      } else if (state < RM_OUTSIDE) {
-        for (rm_lid z = tr->list_offset[-2 - state]; z < tr->list_offset[-1 - state]; z++)
-          add(w, i, tr->winding[z].cell, kind, s * tr->winding[z].number, pt, &p, &q);
+    for (rm_lid k = 0; k <= count; k++) {
+      const rm_crossing *x = &tr->crossing[tr->first[e] + k];
+      const point        q = k == count ? vertex_point(w, m, m->edge[e][1]) : crossing_point(w, 0, x);
+
+      if (in[0] >= RM_OUTSIDE) {
+        add_side(w, i, in, kind, s, pt, &p, &q);
+      } else {
+        for (rm_lid z = tr->list_offset[-2 - in[0]]; z < tr->list_offset[-1 - in[0]]; z++)
+          add_side(w, i, (rm_lid[2]){tr->winding[z].cell, RM_OUTSIDE}, kind, s * tr->winding[z].number, pt, &p, &q);
       }
+      p = q;
+      if (k < count) in[0] = x->state;
     }
   }
 }
 
 /* Pieces of edges of mesh 2 inside cell i. */
-INLINE void foreign_pieces(work *w, rm_lid i, sink *add)
+INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
 {
-  const rm_overlay *o  = w->o;
-  const rm_trimesh *m2 = o->mesh[1];
-  const rm_trace   *tr = &o->trace[1];
+  const rm_trimesh *m  = w->o->mesh[1];
+  const rm_trace   *tr = &w->o->trace[1];
 
   for (int64_t k = w->piece_offset[i]; k < w->piece_offset[i + 1]; k++) {
-    const rm_lid f = w->piece[k][0];
-    point        p, q;
-    const rm_lid state = piece_ends(o, 1, f, w->piece[k][1], &p, &q);
-    double       number = 1;
+    const rm_lid       f = w->piece[k][0], at = w->piece[k][1];
+    const rm_crossing *x = &tr->crossing[tr->first[f] + at];
+    const point        p = at == 0 ? vertex_point(w, m, m->edge[f][0]) : crossing_point(w, 1, x - 1);
+    const point        q = at == tr->count[f] ? vertex_point(w, m, m->edge[f][1]) : crossing_point(w, 1, x);
+    const rm_lid       state  = at == 0 ? tr->state[f] : x[-1].state;
+    double             number = 1;
 
     if (state < RM_OUTSIDE)
       for (rm_lid z = tr->list_offset[-2 - state]; z < tr->list_offset[-1 - state]; z++)
         if (tr->winding[z].cell == i) number = tr->winding[z].number;
-    for (rm_lid z = m2->star_offset[f]; z < m2->star_offset[f + 1]; z++) {
-      const rm_lid b    = m2->star[z] / 4;
-      const double s    = (m2->star[z] & 3) == 2 ? -number : number;
-      const plane  pb   = plane_of(o, 1, b);
-      const int    kind = FROM_TARGET | (m2->triangle_is_skin[b] ? SKIN_TARGET : 0);
-      if (m2->side[b][0] >= 0) add(w, i, m2->side[b][0], kind, s, &pb, &p, &q);
-      if (m2->side[b][1] >= 0) add(w, i, m2->side[b][1], kind, -s, &pb, &p, &q);
+    for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
+      const rm_lid b  = m->star[z] / 4;
+      const plane  pb = plane_of(w, 1, b);
+
+      add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0), (m->star[z] & 3) == 2 ? -number : number,
+               &pb, &p, &q);
     }
   }
 }
 
-INLINE void all_cones(work *w, rm_lid i, sink *add)
+INLINE void all_sides(work *w, rm_lid i, sink *add_side)
 {
   const rm_trimesh *m1 = w->o->mesh[0];
+  const double     *box = m1->cell_box[i];
 
+  w->extent = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
+  for (int c = 0; c < 3; c++) w->centre[c] = box[c] + 0.5 * (box[c + 3] - box[c]);
   for (rm_lid a = m1->cell_triangle_offset[i]; a < m1->cell_triangle_offset[i + 1]; a++) {
-    const plane  pt = plane_of(w->o, 0, m1->cell_triangle[a] / 2);
+    const plane  pt = plane_of(w, 0, m1->cell_triangle[a] / 2);
     const double g  = m1->cell_triangle[a] & 1 ? -1 : 1;
-    segments_in(w, i, &pt, g, add);
-    own_pieces_in(w, i, &pt, g, add);
+    segments_in(w, i, &pt, g, add_side);
+    own_pieces_in(w, i, &pt, g, add_side);
   }
-  foreign_pieces(w, i, add);
+  foreign_pieces(w, i, add_side);
 }
 
 /* ---- double-double -------------------------------------------------------------------------------------------------- */
@@ -271,12 +277,11 @@ static void dd_relative(work *w, const point *p, const double origin[3], rm_dd o
   for (int c = 0; c < 3; c++) out[c] = rm_dd_add(out[c], m->delta[c]);
 }
 
-static void add_cone_dd(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q)
+static void add_cone_dd(work *w, rm_lid j, double sign, const plane *pl, const point *p, const point *q)
 {
   const slot *s = &w->slots[w->slot_of[j]];
   rm_dd      *sum = w->exact[w->slot_of[j]], r[3], a[3], b[3], cross[3];
 
-  (void)i, (void)kind;
   if (!(s->kinds & AGAIN)) return;
   dd_difference(pl->v, s->o, r);
   dd_relative(w, p, s->o, a);
@@ -286,12 +291,18 @@ static void add_cone_dd(work *w, rm_lid i, rm_lid j, int kind, double sign, cons
   sum[0] = rm_dd_add(sum[0], six_v);
   for (int c = 0; c < 3; c++) sum[1 + c] = rm_dd_add(sum[1 + c], rm_dd_mul(six_v, rm_dd_add(r[c], rm_dd_add(a[c], b[c]))));
   for (int k = 0; k < w->num_sums - 4; k++) {
-    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-    const int        x = row[k], y = column[k];
-    const rm_dd      sx = rm_dd_add(r[x], rm_dd_add(a[x], b[x])), sy = rm_dd_add(r[y], rm_dd_add(a[y], b[y]));
-    const rm_dd      own = rm_dd_add(rm_dd_mul(r[x], r[y]), rm_dd_add(rm_dd_mul(a[x], a[y]), rm_dd_mul(b[x], b[y])));
+    const int   x = row_of[k], y = column_of[k];
+    const rm_dd sx = rm_dd_add(r[x], rm_dd_add(a[x], b[x])), sy = rm_dd_add(r[y], rm_dd_add(a[y], b[y]));
+    const rm_dd own = rm_dd_add(rm_dd_mul(r[x], r[y]), rm_dd_add(rm_dd_mul(a[x], a[y]), rm_dd_mul(b[x], b[y])));
     sum[4 + k] = rm_dd_add(sum[4 + k], rm_dd_mul(six_v, rm_dd_add(own, rm_dd_mul(sx, sy))));
   }
+}
+
+static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+{
+  (void)i, (void)kind;
+  for (int h = 0; h < 2; h++)
+    if (j[h] >= 0) add_cone_dd(w, j[h], h ? -sign : sign, pl, p, q);
 }
 
 /* ---- one source cell ------------------------------------------------------------------------------------------------- */
@@ -314,10 +325,9 @@ static remap_status push_pair(work *w, rm_lid i, const slot *s, uint8_t flags)
   w->flags[n]  = flags;
   for (int k = 0; k < 3; k++) w->moment[n][k] = m[k] + d[k] * v;
   if (w->num_sums == 10) {
-    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
     RM_TRY(rm_grow(&w->second, &w->room[5], need, sizeof *w->second));
     for (int k = 0; k < 6; k++) {
-      const int x = row[k], y = column[k];
+      const int x = row_of[k], y = column_of[k];
       w->second[n][k] = s->sum[4 + k] / 120 + (d[x] * m[y] + d[y] * m[x]) + d[x] * d[y] * v;
     }
   }
@@ -331,14 +341,14 @@ static remap_status look_again(work *w, rm_lid i, bool sums, bool polygons)
   if (sums) {
     RM_TRY(rm_grow(&w->exact, &w->exact_room, w->num_slots, sizeof *w->exact));
     memset(w->exact, 0, sizeof *w->exact * (size_t)w->num_slots);
-    all_cones(w, i, add_cone_dd);
+    all_sides(w, i, add_dd);
     for (int k = 0; k < w->num_slots; k++)
       if (w->slots[k].kinds & AGAIN)
         for (int c = 0; c < w->num_sums; c++) w->slots[k].sum[c] = w->exact[k][c].hi + w->exact[k][c].lo;
   }
   if (polygons) {
     w->num_polygons = w->num_corners = 0;
-    all_cones(w, i, rm_moments_add_polygon);
+    all_sides(w, i, rm_moments_add_polygon);
   }
   return w->status;
 }
@@ -425,40 +435,56 @@ static remap_status file_pieces(work *w)
 
 static remap_status all_cells(work *w)
 {
+  const rm_trimesh *m1 = w->o->mesh[0];
+
   RM_TRY(file_pieces(w));
   RM_NEW(w->memo, w->scratch, NUM_MEMOS);
   for (int k = 0; k < NUM_MEMOS; k++) w->memo[k].edge = -1;
   RM_NEW(w->slot_of, w->scratch, w->o->mesh[1]->num_cells);
   for (rm_lid j = 0; j < w->o->mesh[1]->num_cells; j++) w->slot_of[j] = -1;
-  for (rm_lid i = 0; i < w->o->mesh[0]->num_cells; i++) {
-    if (w->num_sums == 4) all_cones(w, i, add_cone);
-    else all_cones(w, i, add_cone_2);
-    RM_TRY(w->status);
-    RM_TRY(finish_cell(w, i));
-  }
+  for (rm_lid t = 0; t < m1->num_triangles; t++) /* cells by their first triangle: as they lie in space */
+    for (int h = 0; h < 2; h++) {
+      const rm_lid i = m1->side[t][h];
+
+      if (i < 0 || m1->cell_triangle[m1->cell_triangle_offset[i]] != 2 * t + h) continue;
+      if (w->num_sums == 4) all_sides(w, i, add);
+      else all_sides(w, i, add_2);
+      RM_TRY(w->status);
+      RM_TRY(finish_cell(w, i));
+    }
   return REMAP_OK;
 }
 
-static void *kept(rm_arena *arena, const void *data, int64_t n, size_t size)
+/* data[place[k]] for all k, in the arena. */
+static void *kept(rm_arena *arena, const void *data, const int64_t *place, int64_t n, size_t size)
 {
-  void *copy = rm_arena_alloc(arena, n, size);
-  if (copy && n) memcpy(copy, data, (size_t)n * size);
-  return copy;
+  const char *from = data;
+  char       *to   = rm_arena_alloc(arena, n, size);
+
+  for (int64_t k = 0; to && k < n; k++) memcpy(to + (size_t)k * size, from + (size_t)place[k] * size, size);
+  return to;
 }
 
+/* The pairs in the order of their sources. */
 static remap_status keep(rm_arena *arena, const work *w, const rm_moments **out)
 {
   const int64_t n = w->num_pairs;
+  int64_t      *next, *place;
   rm_moments   *m;
 
+  RM_NEW0(next, w->scratch, (int64_t)w->o->mesh[0]->num_cells + 1);
+  RM_NEW(place, w->scratch, n);
+  for (int64_t k = 0; k < n; k++) next[w->source[k]]++;
+  rm_offsets(next, w->o->mesh[0]->num_cells);
+  for (int64_t k = 0; k < n; k++) place[next[w->source[k]]++] = k;
   RM_NEW0(m, arena, 1);
   m->num_pairs = n;
-  m->source    = kept(arena, w->source, n, sizeof *w->source);
-  m->target    = kept(arena, w->target, n, sizeof *w->target);
-  m->volume    = kept(arena, w->volume, n, sizeof *w->volume);
-  m->moment    = kept(arena, w->moment, n, sizeof *w->moment);
-  m->flags     = kept(arena, w->flags, n, sizeof *w->flags);
-  m->second    = w->num_sums == 10 ? kept(arena, w->second, n, sizeof *w->second) : NULL;
+  m->source    = kept(arena, w->source, place, n, sizeof *w->source);
+  m->target    = kept(arena, w->target, place, n, sizeof *w->target);
+  m->volume    = kept(arena, w->volume, place, n, sizeof *w->volume);
+  m->moment    = kept(arena, w->moment, place, n, sizeof *w->moment);
+  m->flags     = kept(arena, w->flags, place, n, sizeof *w->flags);
+  m->second    = w->num_sums == 10 ? kept(arena, w->second, place, n, sizeof *w->second) : NULL;
   if (!m->source || !m->target || !m->volume || !m->moment || !m->flags || (w->num_sums == 10 && !m->second)) return REMAP_NO_MEMORY;
   *out = m;
   return REMAP_OK;

@@ -28,8 +28,9 @@ typedef struct slot {
   int32_t num_cones;
   int     kinds;
   int     first_polygon; /* of the pair in work.polygon, NO_POLYGONS if they are not wanted */
+  bool    is_local;      /* o is the pair's own, not that of cell i */
   double  o[3];
-  double  reach; /* largest extent of the meeting of the boxes */
+  double  reach; /* the pair's points are within half of it of o, along each axis */
   double  sum[10];
 } slot;
 
@@ -37,6 +38,7 @@ typedef struct slot {
 typedef struct point {
   const double *base;     /* the edge's first vertex, or the vertex  */
   double        delta[3]; /* from there; 0 for a vertex              */
+  double        at[3];    /* relative to the origin of cell i        */
   int           mesh;     /* of the edge                             */
   rm_lid        edge;     /* -1 for a vertex                         */
   rm_lid        triangle; /* of the other mesh, crossed by the edge  */
@@ -48,6 +50,8 @@ typedef struct plane {
   rm_lid        triangle;
   const double *n, *v;   /* normal, a vertex */
   double        inverse; /* 1 / n.n, 0 for a triangle without area */
+  double        foot[3]; /* of the perpendicular from the origin of cell i, relative to it */
+  double        height;  /* foot = height n */
 } plane;
 
 /* One polygon of a pair, for the decision whether the pair has volume. */
@@ -90,6 +94,8 @@ typedef struct work {
   slot             *slots;
   int64_t           slots_room;
   int               num_slots;
+  double            centre[3]; /* origin of cell i: the centre of its box */
+  double            extent;    /* largest extent of that box              */
   polygon          *polygon;
   int64_t           polygon_room;
   int               num_polygons;
@@ -107,8 +113,9 @@ typedef struct work {
   int64_t           num_pairs, room[6];
 } work;
 
-/* What is done with each cone: of pair (i, j), in plane pl, over the side p -> q of a polygon there, counted sign times. */
-typedef void sink(work *w, rm_lid i, rm_lid j, int kind, double sign, const plane *pl, const point *p, const point *q);
+/* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2 (or in
+ * one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. */
+typedef void sink(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q);
 
 /* A point relative to an origin. */
 INLINE void relative(const point *p, const double o[3], double out[3])

@@ -70,6 +70,7 @@ typedef struct rm_crossing {
   double lambda;   /* where on the edge, 0..1 from its first vertex; a function of the coordinates alone */
   rm_lid triangle; /* 2 * triangle + (1 if the edge runs against its normal)                             */
   rm_lid state;    /* behind the crossing, seen along the edge                                           */
+  rm_lid edge;     /* whose crossing it is                                                               */
 } rm_crossing;
 
 /* A cell and how often it winds about a point. */
@@ -82,7 +83,7 @@ typedef struct rm_winding {
  * the list num = -2 - state of `winding`. Read-only once built. Invariants: crossings of an edge stand in their exact order. */
 typedef struct rm_trace {
   int64_t            num_crossings;
-  const rm_crossing *crossing;      /* [num_crossings] edge after edge, but not in the order of edges    */
+  const rm_crossing *crossing;      /* [num_crossings] edge after edge                                   */
   const int64_t     *first;         /* [num_edges] an edge's first crossing                              */
   const rm_lid      *count;         /* [num_edges] number of its crossings                               */
   const rm_lid      *state;         /* [num_edges] before the first crossing                             */

@@ -447,12 +447,28 @@ static void reverse(hit *h, int n)
   }
 }
 
+/* The edge's box misses the box of the other mesh. */
+static bool is_far(const tracer *t, rm_lid e)
+{
+  const double *p = t->own->vertex[t->own->edge[e][0]], *q = t->own->vertex[t->own->edge[e][1]], *box = t->other->box;
+
+  for (int c = 0; c < 3; c++)
+    if ((p[c] < box[c] && q[c] < box[c]) || (p[c] > box[c + 3] && q[c] > box[c + 3])) return true;
+  return false;
+}
+
 /* Trace edge e from the end that has state *state; *state becomes the other end's. */
 static remap_status trace_edge(tracer *t, rm_lid e, int dir, rm_lid *state)
 {
   rm_lid at  = *state;
   walked how = WALK_NOT;
 
+  if (at == RM_OUTSIDE && is_far(t, e)) {
+    t->first[e] = t->num_crossings;
+    t->count[e] = 0;
+    t->state[e] = RM_OUTSIDE;
+    return REMAP_OK;
+  }
   set_line(t, t->own->vertex[t->own->edge[e][0]], t->own->vertex[t->own->edge[e][1]]);
   if (!t->by_tree) RM_TRY(walk_alone(t, dir, state, &how));
   if (how == WALKED) {
@@ -471,7 +487,7 @@ static remap_status trace_edge(tracer *t, rm_lid e, int dir, rm_lid *state)
   for (int k = 0; k < t->num_hits; k++) {
     const hit h = t->hits[k];
     RM_TRY(rm_states_cross(&t->states, at, t->other->side[h.triangle], h.sign, &at));
-    t->crossing[t->num_crossings++] = (rm_crossing){parameter(t, h.triangle), 2 * h.triangle + (h.sign < 0), at};
+    t->crossing[t->num_crossings++] = (rm_crossing){parameter(t, h.triangle), 2 * h.triangle + (h.sign < 0), at, e};
   }
   return REMAP_OK;
 }
@@ -515,19 +531,19 @@ enum {
 static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_edge)
 {
   const rm_trimesh *m = t->own;
-  rm_lid           *where, *queue, head = 0, tail = 0, done = 0, components = 0;
+  rm_lid           *where, *stack, depth = 0, done = 0, components = 0;
 
   RM_NEW(where, t->scratch, m->num_vertices);
-  RM_NEW(queue, t->scratch, m->num_vertices);
+  RM_NEW(stack, t->scratch, m->num_vertices);
   for (rm_lid v = 0; v < m->num_vertices; v++) where[v] = UNKNOWN;
   for (rm_lid e = 0; e < m->num_edges; e++) t->count[e] = -1;
   for (rm_lid seed = 0; seed < m->num_vertices; seed++) {
     if (where[seed] != UNKNOWN) continue;
     if (++components == LOCATED_PLAIN) RM_TRY(need_all_tree(t));
     RM_TRY(locate(t, m->vertex[seed], &where[seed]));
-    queue[tail++] = seed;
-    while (head < tail) {
-      const rm_lid v = queue[head++];
+    stack[depth++] = seed;
+    while (depth > 0) {
+      const rm_lid v = stack[--depth];
 
       for (rm_lid k = m->vertex_edge_offset[v]; k < m->vertex_edge_offset[v + 1]; k++) {
         const rm_lid e = m->vertex_edge[k], dir = m->edge[e][0] == v ? 1 : -1, w = m->edge[e][dir > 0 ? 1 : 0];
@@ -535,7 +551,7 @@ static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_e
 
         if (t->count[e] >= 0) continue;
         RM_TRY(trace_edge(t, e, dir, &state));
-        if (where[w] == UNKNOWN) where[w] = state, queue[tail++] = w;
+        if (where[w] == UNKNOWN) where[w] = state, stack[depth++] = w;
         if (where[w] != state) {
           *bad_edge = e;
           return REMAP_INCONSISTENT;
@@ -549,8 +565,10 @@ static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_e
   return REMAP_OK;
 }
 
+/* The crossings in the order of their edges, as neighbours in space are neighbours in memory then. */
 static remap_status keep(rm_arena *arena, const tracer *t, rm_trace *out)
 {
+  int64_t     *first;
   const rm_lid num_winding = t->states.offset[t->states.num];
   rm_crossing *crossing;
   rm_lid      *offset;
@@ -559,10 +577,14 @@ static remap_status keep(rm_arena *arena, const tracer *t, rm_trace *out)
   RM_NEW(crossing, arena, t->num_crossings);
   RM_NEW(offset, arena, (int64_t)t->states.num + 1);
   RM_NEW(winding, arena, num_winding);
-  if (t->num_crossings) memcpy(crossing, t->crossing, sizeof *crossing * (size_t)t->num_crossings);
+  RM_NEW(first, arena, t->own->num_edges);
+  for (int64_t e = 0, n = 0; e < t->own->num_edges; n += t->count[e++]) {
+    first[e] = n;
+    for (rm_lid k = 0; k < t->count[e]; k++) crossing[n + k] = t->crossing[t->first[e] + k];
+  }
   memcpy(offset, t->states.offset, sizeof *offset * ((size_t)t->states.num + 1));
   if (num_winding) memcpy(winding, t->states.winding, sizeof *winding * (size_t)num_winding);
-  *out = (rm_trace){t->num_crossings, crossing, t->first, t->count, t->state, offset, winding, t->states.num};
+  *out = (rm_trace){t->num_crossings, crossing, first, t->count, t->state, offset, winding, t->states.num};
   return REMAP_OK;
 }
 
@@ -574,7 +596,7 @@ remap_status rm_trace_build(rm_arena *arena, const rm_trimesh *own, const rm_tri
 
   if (status != REMAP_OK) goto done;
   RM_GOTO(done, status = rm_states_init(&t.states));
-  t.first = rm_arena_alloc(arena, own->num_edges, sizeof *t.first);
+  t.first = rm_arena_alloc(t.scratch, own->num_edges, sizeof *t.first);
   t.count = rm_arena_alloc(arena, own->num_edges, sizeof *t.count);
   t.state = rm_arena_alloc(arena, own->num_edges, sizeof *t.state);
   RM_GOTO(done, status = t.first && t.count && t.state ? REMAP_OK : REMAP_NO_MEMORY);
