@@ -33,6 +33,7 @@ static void join(work *w, rm_lid a, rm_lid b)
 
 static inline rm_label label_of(const work *w, rm_lid side) { return w->p->polygon[side / 2].label[side & 1]; }
 static inline bool same_label(rm_label a, rm_label b) { return a.cell[0] == b.cell[0] && a.cell[1] == b.cell[1]; }
+static inline uint64_t label_key(rm_label a) { return (uint64_t)(uint32_t)(a.cell[0] + 1) << 32 | (uint32_t)(a.cell[1] + 1); }
 static inline bool is_outside(rm_label a) { return a.cell[0] == RM_OUTSIDE && a.cell[1] == RM_OUTSIDE; }
 
 /* ---- around an edge -------------------------------------------------------------------------------------------------- */
@@ -40,19 +41,19 @@ static inline bool is_outside(rm_label a) { return a.cell[0] == RM_OUTSIDE && a.
 /* Join the sides that face each other if every label is there twice; false if one is not. */
 static bool join_by_label(work *w, const rm_arc *arc, rm_lid n)
 {
-  rm_lid side[8];
+  uint64_t key[8];
+  rm_lid   partner[8];
 
   if (n > 4) return false;
-  for (rm_lid k = 0; k < 2 * n; k++) side[k] = 2 * arc[k / 2].polygon + (k & 1);
+  for (rm_lid k = 0; k < 2 * n; k++) key[k] = label_key(label_of(w, 2 * arc[k / 2].polygon + (k & 1)));
   for (rm_lid k = 0; k < 2 * n; k++) {
     int times = 0;
-    if (is_outside(label_of(w, side[k]))) continue;
-    for (rm_lid m = 0; m < 2 * n; m++) times += same_label(label_of(w, side[k]), label_of(w, side[m]));
-    if (times != 2) return false;
+    for (rm_lid m = 0; m < 2 * n && key[k]; m++)
+      if (m != k && key[m] == key[k]) partner[k] = m, times++;
+    if (key[k] && times != 1) return false;
   }
   for (rm_lid k = 0; k < 2 * n; k++)
-    for (rm_lid m = k + 1; m < 2 * n; m++)
-      if (!is_outside(label_of(w, side[k])) && same_label(label_of(w, side[k]), label_of(w, side[m]))) join(w, side[k], side[m]);
+    if (key[k] && partner[k] > k) join(w, 2 * arc[k / 2].polygon + (k & 1), 2 * arc[partner[k] / 2].polygon + (partner[k] & 1));
   return true;
 }
 
@@ -143,7 +144,7 @@ static remap_status join_sides(work *w)
 
 static inline double largest(const double x[3]) { return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))); }
 
-/* Six times the volume of the cone from o over a polygon; a bound of its error is added to *noise. */
+/* Six times the volume of the cone from o over a polygon; if noise is not NULL, a bound of its error is added to *noise. */
 static double cone(const work *w, const rm_polygon *g, const double o[3], double *noise)
 {
   const rm_lid *v = w->p->vertex + g->first;
@@ -153,8 +154,8 @@ static double cone(const work *w, const rm_polygon *g, const double o[3], double
   for (rm_lid i = 2; i < g->num; i++) {
     for (int k = 0; k < 3; k++) c[k] = w->l->xyz[v[i]][k] - o[k];
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
-    const double reach = fmax(largest(a), fmax(largest(b), largest(c)));
-    *noise += reach * reach * (0x1p-46 * reach + 16 * (w->l->error[v[0]] + w->l->error[v[i - 1]] + w->l->error[v[i]]));
+    const double reach = noise ? fmax(largest(a), fmax(largest(b), largest(c))) : 0;
+    if (noise) *noise += reach * reach * (0x1p-46 * reach + 16 * (w->l->error[v[0]] + w->l->error[v[i - 1]] + w->l->error[v[i]]));
     memcpy(b, c, sizeof b);
   }
   return sum;
@@ -191,10 +192,16 @@ typedef struct shells {
   bool     *is_void; /* winds the other way, beyond rounding */
 } shells;
 
+static const double *origin_of(const work *w, const shells *s, rm_lid shell)
+{
+  return w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[shell] / 2].first]];
+}
+
 static remap_status collect_shells(work *w, shells *s)
 {
   const rm_lid sides = (rm_lid)(2 * w->p->num);
   double      *noise;
+  bool         any = false;
 
   RM_NEW(s->of, w->scratch, sides);
   RM_NEW(s->first_side, w->scratch, sides);
@@ -214,21 +221,19 @@ static remap_status collect_shells(work *w, shells *s)
   RM_NEW0(noise, w->scratch, s->num);
   RM_NEW(s->is_void, w->scratch, s->num);
   for (rm_lid k = 0; k < s->num; k++) s->inside[k] = k, s->label[k] = label_of(w, s->first_side[k]);
-  for (rm_lid k = 0; k < sides; k++) {
-    if (s->of[k] < 0) continue;
-    const double *o = w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[s->of[k]] / 2].first]];
-    s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], o, &noise[s->of[k]]);
-  }
-  for (rm_lid k = 0; k < s->num; k++) s->is_void[k] = 6 * s->volume[k] < -noise[k];
+  for (rm_lid k = 0; k < sides; k++)
+    if (s->of[k] >= 0) s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), NULL);
+  for (rm_lid k = 0; k < s->num; k++) any = any || (s->is_void[k] = s->volume[k] < 0);
+  for (rm_lid k = 0; k < sides && any; k++)
+    if (s->of[k] >= 0 && s->is_void[s->of[k]]) cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), &noise[s->of[k]]);
+  for (rm_lid k = 0; k < s->num && any; k++) s->is_void[k] = s->is_void[k] && 6 * s->volume[k] < -noise[k];
   return REMAP_OK;
 }
-
-static uint64_t label_key(rm_label a) { return (uint64_t)(uint32_t)(a.cell[0] + 1) << 32 | (uint32_t)(a.cell[1] + 1); }
 
 /* The shell among those of ids list[0..n) that winds about a vertex of the void. */
 static rm_lid shell_around(const work *w, const shells *s, rm_lid hollow, const rm_keyed *list, int64_t n)
 {
-  const double *o    = w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[hollow] / 2].first]];
+  const double *o    = origin_of(w, s, hollow);
   rm_lid        best = -1;
   double        most = 0;
 

@@ -3,7 +3,7 @@
  * The overlay finds every crossing of an edge with the inside of a triangle, but thinks mesh 2 moved by an infinitesimal. Three
  * kinds of contacts say all about its limit: vertices of one mesh on triangles of the other, either way, and edges that cross each
  * other inside. A crossing whose edge or triangle takes part in one of them at its place becomes that contact; all others are
- * vertices of their own. O(n log n): one query of a box tree per vertex and per edge of mesh 1. */
+ * vertices of their own. Contacts are looked for in the cells that the overlay names: O(n + crossings) times the size of a cell. */
 #include "cells/cells_private.h"
 
 #include <math.h>
@@ -20,6 +20,8 @@ typedef struct builder {
   const rm_part *part;
   rm_limit      *l;
   rm_reason     *reason;
+  const rm_boxtree *tree[2];      /* [side] over all triangles, NULL until needed */
+  double       (*box[2])[6];
   uint8_t       *edge_present[2]; /* [side][num_edges] some present triangle has the edge */
   rm_feature    *at[2];           /* [side][num_vertices] where the vertex lies in the other mesh */
   edge_contact  *contact;         /* ascending by edge[0] */
@@ -92,20 +94,22 @@ static remap_status join_copies(builder *b, int side)
 
 /* ---- contacts ------------------------------------------------------------------------------------------------------- */
 
-static remap_status tree_of(rm_arena *scratch, rm_lid n, const double (*vertex)[3], const rm_lid *item, int corners, double (**box)[6],
-                            const rm_boxtree **tree)
+/* A feature that a point of cell j, moved by an infinitesimal, lies on is one of that cell; of the skin if it is in no cell. Where a
+ * cell is too large to be searched through, a tree over all triangles is, made when first needed. */
+enum { LARGE = 256 };
+
+static remap_status need_tree(builder *b, int side)
 {
-  RM_NEW(*box, scratch, n);
-  for (rm_lid k = 0; k < n; k++)
+  const rm_trimesh *m = b->l->o->mesh[side];
+
+  if (b->tree[side]) return REMAP_OK;
+  RM_NEW(b->box[side], b->scratch, m->num_triangles);
+  for (rm_lid t = 0; t < m->num_triangles; t++)
     for (int c = 0; c < 3; c++) {
-      double low = vertex[item[corners * (int64_t)k]][c], high = low;
-      for (int h = 1; h < corners; h++) {
-        const double x = vertex[item[corners * (int64_t)k + h]][c];
-        low = x < low ? x : low, high = x > high ? x : high;
-      }
-      (*box)[k][c] = low, (*box)[k][c + 3] = high;
+      b->box[side][t][c]     = fmin(corner(m, t, 0)[c], fmin(corner(m, t, 1)[c], corner(m, t, 2)[c]));
+      b->box[side][t][c + 3] = fmax(corner(m, t, 0)[c], fmax(corner(m, t, 1)[c], corner(m, t, 2)[c]));
     }
-  return rm_boxtree_build(scratch, n, (const double (*)[6])*box, tree);
+  return rm_boxtree_build(b->scratch, m->num_triangles, (const double (*)[6])b->box[side], &b->tree[side]);
 }
 
 typedef struct vertex_query {
@@ -115,7 +119,7 @@ typedef struct vertex_query {
   rm_feature      found;
 } vertex_query;
 
-/* Where in triangle t of the other mesh the point lies, if it does; the lowest feature wins. */
+/* Where in triangle t of the other mesh the point lies, if it does; a vertex ends the search, an edge wins. */
 static int touch_triangle(void *user, rm_lid t)
 {
   vertex_query     *q = user;
@@ -139,25 +143,48 @@ static int touch_triangle(void *user, rm_lid t)
   if (zeros == 1) {
     const int h = !turn[0] ? 0 : !turn[1] ? 1 : 2;
     q->found = (rm_feature){RM_ON_EDGE, m->triangle_edge[t][h]};
-  } else {
+  } else if (q->found.kind == RM_ON_NOTHING) {
     q->found = (rm_feature){RM_ON_TRIANGLE, t};
   }
   return 0;
 }
 
+static int touch_skin(void *user, rm_lid item)
+{
+  const vertex_query *q = user;
+  return touch_triangle(user, q->l->o->mesh[q->other]->skin[item]);
+}
+
+/* State of a vertex in the other mesh. */
+static rm_lid state_of_vertex(const rm_overlay *o, int side, rm_lid v)
+{
+  const rm_trimesh *m = o->mesh[side];
+  const rm_trace   *t = &o->trace[side];
+  const rm_lid      e = m->vertex_edge[m->vertex_edge_offset[v]];
+
+  if (m->edge[e][0] == v || t->count[e] == 0) return t->state[e];
+  return t->crossing[t->first[e] + t->count[e] - 1].state;
+}
+
 static remap_status place_vertices(builder *b, int side)
 {
   const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
-  const rm_boxtree *tree;
-  double          (*box)[6];
 
   RM_NEW(b->at[side], b->scratch, own->num_vertices);
-  RM_TRY(tree_of(b->scratch, other->num_triangles, other->vertex, &other->triangle[0][0], 3, &box, &tree));
   for (rm_lid v = 0; v < own->num_vertices; v++) {
+    const rm_lid  j = state_of_vertex(b->l->o, side, v);
     const double *p = own->vertex[v], at[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};
     vertex_query  q = {b->l, 1 - side, p, {RM_ON_NOTHING, -1}};
 
-    rm_boxtree_query(tree, (const double (*)[6])box, at, touch_triangle, &q);
+    if (j == RM_OUTSIDE) {
+      rm_boxtree_query(other->skin_tree, other->skin_box, at, touch_skin, &q);
+    } else if (j < RM_OUTSIDE || other->cell_triangle_offset[j + 1] - other->cell_triangle_offset[j] > LARGE) {
+      RM_TRY(need_tree(b, 1 - side));
+      rm_boxtree_query(b->tree[1 - side], (const double (*)[6])b->box[1 - side], at, touch_triangle, &q);
+    } else {
+      for (rm_lid k = other->cell_triangle_offset[j]; k < other->cell_triangle_offset[j + 1]; k++)
+        if (touch_triangle(&q, b->l->first_copy[1 - side][other->cell_triangle[k] / 2])) break;
+    }
     b->at[side][v] = q.found;
   }
   return REMAP_OK;
@@ -167,13 +194,13 @@ typedef struct edge_query {
   builder      *b;
   rm_lid        edge;
   const double *p0, *p1;
+  int64_t       first; /* contact of this edge */
   remap_status  status;
 } edge_query;
 
 /* Edges that are coplanar and cross inside both: each has its ends on both sides of the other. */
-static int touch_edge(void *user, rm_lid f)
+static int touch_edge(edge_query *q, rm_lid f)
 {
-  edge_query       *q  = user;
   const rm_trimesh *m2 = q->b->l->o->mesh[1];
   const double     *f0 = m2->vertex[m2->edge[f][0]], *f1 = m2->vertex[m2->edge[f][1]];
   double            o[3];
@@ -182,27 +209,62 @@ static int touch_edge(void *user, rm_lid f)
   if (!rm_off_plane(q->p0, q->p1, f0, o) && !rm_off_plane(q->p0, q->p1, f1, o)) return 0;
   if (rm_orient3d(o, q->p0, q->p1, f0) * rm_orient3d(o, q->p0, q->p1, f1) >= 0) return 0;
   if (rm_orient3d(o, f0, f1, q->p0) * rm_orient3d(o, f0, f1, q->p1) >= 0) return 0;
+  for (int64_t k = q->first; k < q->b->num_contacts; k++)
+    if (q->b->contact[k].edge[1] == f) return 0;
   q->status = rm_grow(&q->b->contact, &q->b->contact_room, q->b->num_contacts + 1, sizeof *q->b->contact);
   if (q->status != REMAP_OK) return 1;
   q->b->contact[q->b->num_contacts++] = (edge_contact){{q->edge, f}, -1};
   return 0;
 }
 
+static int touch_edges_of(void *user, rm_lid t)
+{
+  edge_query *q = user;
+
+  for (int h = 0; h < 3; h++)
+    if (touch_edge(q, q->b->l->o->mesh[1]->triangle_edge[t][h])) return 1;
+  return 0;
+}
+
+static int touch_edges_of_skin(void *user, rm_lid item)
+{
+  const edge_query *q = user;
+  return touch_edges_of(user, q->b->l->o->mesh[1]->skin[item]);
+}
+
+/* Contacts of an edge with those of cell j, in which a piece of it runs. */
+static remap_status touch_cell(edge_query *q, rm_lid j)
+{
+  builder          *b  = q->b;
+  const rm_trimesh *m2 = b->l->o->mesh[1];
+  double            at[6];
+
+  if (j >= 0 && m2->cell_edge_offset[j] < m2->cell_edge_offset[j + 1]) {
+    for (rm_lid k = m2->cell_edge_offset[j]; k < m2->cell_edge_offset[j + 1]; k++)
+      if (touch_edge(q, m2->cell_edge[k])) break;
+    return q->status;
+  }
+  for (int c = 0; c < 3; c++) at[c] = fmin(q->p0[c], q->p1[c]), at[c + 3] = fmax(q->p0[c], q->p1[c]);
+  if (j == RM_OUTSIDE) {
+    rm_boxtree_query(m2->skin_tree, m2->skin_box, at, touch_edges_of_skin, q);
+  } else {
+    RM_TRY(need_tree(b, 1));
+    rm_boxtree_query(b->tree[1], (const double (*)[6])b->box[1], at, touch_edges_of, q);
+  }
+  return q->status;
+}
+
 static remap_status cross_edges(builder *b)
 {
-  const rm_trimesh *m1 = b->l->o->mesh[0], *m2 = b->l->o->mesh[1];
-  const rm_boxtree *tree;
-  double          (*box)[6];
+  const rm_trimesh *m1 = b->l->o->mesh[0];
+  const rm_trace   *trace = &b->l->o->trace[0];
 
-  RM_TRY(tree_of(b->scratch, m2->num_edges, m2->vertex, &m2->edge[0][0], 2, &box, &tree));
   for (rm_lid e = 0; e < m1->num_edges; e++) {
-    edge_query q = {b, e, m1->vertex[m1->edge[e][0]], m1->vertex[m1->edge[e][1]], REMAP_OK};
-    double     at[6];
+    edge_query q = {b, e, m1->vertex[m1->edge[e][0]], m1->vertex[m1->edge[e][1]], b->num_contacts, REMAP_OK};
 
     if (!b->edge_present[0][e]) continue;
-    for (int c = 0; c < 3; c++) at[c] = fmin(q.p0[c], q.p1[c]), at[c + 3] = fmax(q.p0[c], q.p1[c]);
-    rm_boxtree_query(tree, (const double (*)[6])box, at, touch_edge, &q);
-    RM_TRY(q.status);
+    RM_TRY(touch_cell(&q, trace->state[e]));
+    for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) RM_TRY(touch_cell(&q, trace->crossing[x].state));
   }
   for (int side = 0; side < 2; side++) {
     const rm_trimesh *m = b->l->o->mesh[side];

@@ -295,20 +295,40 @@ static remap_status inner_arcs(work *w)
 
 static inline rm_lid end_of(const work *w, rm_lid h) { return w->half[h ^ 1].from; }
 
-/* Order the halves that leave a node counter-clockwise, from the first of them on. */
-static void order_around(const work *w, rm_lid *list, rm_lid n)
+/* True if half y follows half x, both leaving one node, within less than half a turn counter-clockwise. */
+static bool follows(const work *w, rm_lid x, rm_lid y)
+{
+  return rm_turn(&w->view, w->spot[w->half[x].from], w->spot[end_of(w, x)], w->spot[end_of(w, y)]) > 0;
+}
+
+/* Order the halves that leave a node of the boundary counter-clockwise. It has two halves of the boundary, which come first: along
+ * it, which is now the first, and back along it, which becomes the last; all others are between. */
+static void order_at_boundary(const work *w, rm_lid *list, rm_lid n)
+{
+  const rm_lid ahead = list[list[0] & 1], back = list[!(list[0] & 1)];
+
+  for (rm_lid i = 1; i + 1 < n; i++) {
+    const rm_lid x = list[i + 1];
+    rm_lid       k = i;
+    for (; k > 1 && follows(w, x, list[k - 1]); k--) list[k] = list[k - 1];
+    list[k] = x;
+  }
+  list[0]     = ahead;
+  list[n - 1] = back;
+}
+
+/* Order the halves that leave a node inside counter-clockwise, from the first of them on. */
+static void order_inside(const work *w, rm_lid *list, rm_lid n)
 {
   const rm_lid p = w->spot[w->half[list[0]].from], reference = w->spot[end_of(w, list[0])];
 
   for (rm_lid i = 2; i < n; i++) {
-    const rm_lid x = list[i], q = w->spot[end_of(w, x)];
-    const int    turn = rm_turn(&w->view, p, reference, q);
-    rm_lid       k = i;
+    const rm_lid x    = list[i];
+    const int    turn = rm_turn(&w->view, p, reference, w->spot[end_of(w, x)]);
+    rm_lid       k    = i;
     while (k > 1) {
-      const rm_lid r = w->spot[end_of(w, list[k - 1])];
-      const int    other = rm_turn(&w->view, p, reference, r);
-      const bool   before = turn == other ? rm_turn(&w->view, p, q, r) > 0 : turn > other; /* left, straight back, right */
-      if (!before) break;
+      const int other = rm_turn(&w->view, p, reference, w->spot[end_of(w, list[k - 1])]);
+      if (turn == other ? !follows(w, x, list[k - 1]) : turn < other) break; /* left, straight back, right */
       list[k] = list[k - 1];
       k--;
     }
@@ -330,7 +350,8 @@ static remap_status link_halves(work *w)
   for (rm_lid k = 0; k < w->num_nodes; k++) {
     rm_lid      *list = w->around + offset[k];
     const rm_lid n    = offset[k + 1] - offset[k];
-    if (n > 2) order_around(w, list, n);
+    if (n > 2 && k < w->num_boundary) order_at_boundary(w, list, n);
+    if (n > 2 && k >= w->num_boundary) order_inside(w, list, n);
     for (rm_lid i = 0; i < n; i++) w->half[list[(i + 1) % n] ^ 1].next = list[i];
   }
   return REMAP_OK;
