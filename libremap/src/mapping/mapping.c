@@ -154,14 +154,20 @@ static int64_t mark_cut(int64_t n, pair_record *record, uint8_t *is_cut)
   return kept;
 }
 
-/* What is left of a cell through which a skin passes is not even rounding of its volume: where zones abut whose faces do not match,
- * the skins of both pass, and cancel. */
-static bool is_filled(const rows_draft *draft, rm_lid cell, double cell_volume)
+/* How much of a cell with pairs is covered. A skin that passes through it leaves a part outside, unless what is left is not even
+ * rounding of the volume: where zones abut whose faces do not match, the skins of both pass, and cancel. Without a skin the giving
+ * mesh winds about the whole cell equally often: once, if it is not tangled and its zones do not overlap there. */
+static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_volume, bool is_cut)
 {
-  rm_compensated sum = {-cell_volume, 0.0};
+  rm_compensated sum = {0.0, 0.0}, rest = {-cell_volume, 0.0};
 
-  for (int64_t k = draft->offset[cell]; k < draft->offset[cell + 1]; k++) rm_compensated_add(&sum, draft->volume[k]);
-  return fabs(rm_compensated_value(&sum)) <= 0x1p-44 * fabs(cell_volume);
+  for (int64_t k = draft->offset[cell]; k < draft->offset[cell + 1]; k++) {
+    rm_compensated_add(&sum, draft->volume[k]);
+    rm_compensated_add(&rest, draft->volume[k]);
+  }
+  if (is_cut) return fabs(rm_compensated_value(&rest)) <= 0x1p-44 * fabs(cell_volume) ? REMAP_COVERED : REMAP_PARTIAL;
+  if (!(fabs(cell_volume) > 0.0)) return REMAP_COVERED;
+  return rint(rm_compensated_value(&sum) / cell_volume) == 1.0 ? REMAP_COVERED : REMAP_PARTIAL;
 }
 
 /* Rows of one side out of the records that came, which are reordered. What stays to be filled in is `same` and the plan. */
@@ -196,7 +202,7 @@ static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame
       for (int d = 0; d < 3; d++) draft->moment[k][d] = p->moment[d];
     }
     if (draft->offset[c] == draft->offset[c + 1]) continue; /* uncovered */
-    draft->cover[c] = is_cut[c] && !is_filled(draft, c, mesh->cell_volume[c]) ? REMAP_PARTIAL : REMAP_COVERED;
+    draft->cover[c] = (uint8_t)cover_of(draft, c, mesh->cell_volume[c], is_cut[c] != 0);
   }
   return REMAP_OK;
 }

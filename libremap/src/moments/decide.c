@@ -281,7 +281,7 @@ bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bo
       const double *c[3] = {other->vertex[other->triangle[b][0]], other->vertex[other->triangle[b][1]], other->vertex[other->triangle[b][2]]};
       shared += shared_area(v, c, k, s->o);
     }
-    if (shared == 0 || area - shared > 0x1p-40 * area) return true;
+    if (shared == 0 || fabs(area - shared) > 0x1p-40 * area) return true;
   }
   return false;
 }
