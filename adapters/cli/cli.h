@@ -1,6 +1,8 @@
 /* cli.h -- what the files of the remap command share: how it can end, and the one line that says why.
  *
- *   main.c      the job: open, build, read, transfer, verify, write, report
+ *   main.c      the job: open, read, build, transfer, verify, write, report
+ *   fields.c    which fields take part, and their values
+ *   job.c       what these two share
  *   options.c   the command line
  *   report.c    text for people, JSON for programs
  *   progress.c  a line now and then while a long job runs

@@ -1,0 +1,62 @@
+/* job -- what the steps of a run share: agreement of ranks, failures of others in our words, remarks. */
+#include "job.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+
+/* ---- ranks together ----------------------------------------------------------------------------------------------- */
+
+cli_exit cli_agree(const cli_job *j, cli_exit mine, cli_failure *why)
+{
+  struct {
+    int code, rank;
+  } worst = {(int)mine, j->rank};
+
+  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_2INT, MPI_MAXLOC, j->comm);
+  if (worst.code != CLI_DONE) MPI_Bcast(why->text, sizeof why->text, MPI_CHAR, worst.rank, j->comm);
+  return (cli_exit)worst.code;
+}
+
+cli_exit cli_no_memory(cli_failure *why) { return cli_fail(why, CLI_INTERNAL, "memory is out on one rank: use more ranks"); }
+
+/* ---- failures of others in our words ------------------------------------------------------------------------------ */
+
+cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why)
+{
+  static const cli_exit code[] = {[RCGNS_OK]       = CLI_DONE,
+                                  [RCGNS_USAGE]    = CLI_USAGE,
+                                  [RCGNS_IO]       = CLI_IO,
+                                  [RCGNS_GEOMETRY] = CLI_GEOMETRY,
+                                  [RCGNS_MEMORY]   = CLI_INTERNAL};
+
+  return status == RCGNS_OK ? CLI_DONE : cli_fail(why, code[status], "%s", message->text);
+}
+
+/* ---- remarks ------------------------------------------------------------------------------------------------------ */
+
+void cli_note(cli_job *j, const char *format, ...)
+{
+  char  **more = realloc(j->note, (size_t)(j->num_notes + 1) * sizeof *more);
+  va_list args;
+  int     length;
+
+  if (!more) return;
+  j->note = more;
+  va_start(args, format);
+  length = vsnprintf(NULL, 0, format, args);
+  va_end(args);
+  if (length < 0 || !(more[j->num_notes] = malloc((size_t)length + 1))) return;
+  va_start(args, format);
+  vsnprintf(more[j->num_notes++], (size_t)length + 1, format, args);
+  va_end(args);
+}
+
+/* ---- cells -------------------------------------------------------------------------------------------------------- */
+
+const rcgns_zone_info *cli_zone_of(const rcgns_info *info, int64_t cell)
+{
+  int64_t zone = info->num_zones - 1;
+
+  while (zone > 0 && info->zone[zone].first_cell > cell) zone--;
+  return &info->zone[zone];
+}

@@ -1,0 +1,56 @@
+/* job.h -- the one job of a run of remap: what its steps share, and its fields. */
+#ifndef REMAP_CLI_JOB_H
+#define REMAP_CLI_JOB_H
+
+#include "cli.h"
+#include "options.h"
+#include "progress.h"
+#include "report.h"
+
+#include <cgns.h>
+#include <mpi.h>
+#include <remap/remap.h>
+
+/** Everything a step may need. Files and solutions of [remap_side]; the solution of the target holds the old values. */
+typedef struct cli_job {
+  MPI_Comm       comm;
+  int            rank;
+  cli_options    options;
+  double         begin;    /**< MPI_Wtime */
+  cli_progress  *progress; /**< NULL but on a rank that speaks */
+  rcgns_file    *file[2];
+  rcgns_solution solution[2];
+  remap_context *ctx;
+
+  int               num_fields;
+  remap_field_desc *field;  /**< [num_fields] names, natures and where the values are */
+  cli_field_row    *row;    /**< [num_fields] the same fields in the report */
+  double           *values; /**< behind every in and out of field */
+
+  int             num_notes;
+  char          **note;        /**< [num_notes] remarks for the report */
+  cli_report_file report_file; /**< on rank 0 */
+  cli_report      report;
+} cli_job;
+
+/** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
+cli_exit cli_agree(const cli_job *j, cli_exit mine, cli_failure *why);
+
+/** INTERNAL, with the words for it. Not collective. */
+cli_exit cli_no_memory(cli_failure *why);
+
+/** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
+cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why);
+
+/** Remember a remark for the report; one that finds no memory is lost. Not collective. */
+void cli_note(cli_job *j, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/** The zone that holds a global cell. Not collective. */
+const rcgns_zone_info *cli_zone_of(const rcgns_info *info, int64_t cell);
+
+/** Choose the solutions and the fields, make room for their values and read them, old values of the target included: fills
+ *  solution, field, row and values. Collective. Errors: USAGE (what was named is not there), IO (unreadable, or not finite),
+ *  INTERNAL. */
+cli_exit cli_fields_read(cli_job *j, cli_failure *why);
+
+#endif
