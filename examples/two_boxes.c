@@ -106,12 +106,12 @@ static void free_box(box *b)
 /* Overlay the boxes once, then move the field to the target and back again, as a solver does in every time step. */
 static remap_status exchange(remap_context *ctx, box *source, box *target, remap_stats *stats, remap_field_report report[2])
 {
-  const remap_field_desc forward  = {
+  const remap_field_desc forward = {
       .name = "Density", .nature = REMAP_CONSERVED, .has_old = 1, .in = source->density, .out = target->density};
   const remap_field_desc backward = {
       .name = "Density", .nature = REMAP_CONSERVED, .has_old = 1, .in = target->density, .out = source->density};
-  remap_transfer         how;
-  remap_status           status;
+  remap_transfer how;
+  remap_status   status;
 
   remap_transfer_default(&how);
   how.limiter = REMAP_LIMITER_NONE; /* the field is smooth */

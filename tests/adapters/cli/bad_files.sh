@@ -1,6 +1,7 @@
 #!/bin/sh
 # Broken files end the command within seconds, on any number of ranks, with the right exit status and one line that names
 # the file; nothing is left behind and nothing is lost. See cli.sh for the arguments.
+# shellcheck source-path=SCRIPTDIR source=cli.sh
 . "$(dirname "$0")/cli.sh"
 cd "$work" || exit 1
 head -c 9000 good.cgns >cut_off.cgns

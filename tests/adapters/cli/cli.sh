@@ -1,3 +1,4 @@
+# shellcheck shell=sh disable=SC2016,SC2086 # $wrapper is several words or none
 # cli.sh -- what the scripts that test the remap command share; they source it and end with `finish`.
 #
 #   SCRIPT MPIEXEC NUMPROC_FLAG REMAP TOOLS

@@ -1,5 +1,6 @@
 #!/bin/sh
 # The report and the file that is written, on meshes that are easy to know. See cli.sh for the arguments.
+# shellcheck source-path=SCRIPTDIR source=cli.sh
 . "$(dirname "$0")/cli.sh"
 cd "$work" || exit 1
 
@@ -103,6 +104,9 @@ is 0 fields 0 conservation_error
 hold "$wrong" "a file remapped onto itself keeps its fields"
 works 1 good.cgns mesh.cgns -q -o out.cgns --report /dev/stdout && grep -q '"peak_rss_bytes_max"' stdout
 hold $? "the report can go to standard output"
+ln -s behind.json link.json
+works 1 good.cgns mesh.cgns -q -o out.cgns --report link.json && [ -L link.json ] && grep -q '"peak_rss_bytes_max"' behind.json
+hold $? "a report goes through a link and leaves the link"
 
 "$tools/make_demo" . 10 >/dev/null || complain "no demo"
 for n in 1 2 3; do works "$n" source.cgns target.cgns -o "out$n.cgns" --report "report$n.json"; done
