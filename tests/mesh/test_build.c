@@ -543,6 +543,7 @@ static void a_cell_turned_inside_out_has_negative_volume_and_is_counted(void)
 
   if (rt_all(mesh != NULL)) {
     RT_EQ(mesh->num_inverted, 16);
+    RT_EQ(mesh->worst_inverted, 0); /* all alike: the first */
     RT_NEAR(mesh->volume, 0.125, 0.0);
     for (rm_lid c = 0; c < mesh->num_cells; c++) RT_NEAR(mesh->cell_volume[c], -0.125 / 16, 0.0);
   }

@@ -178,6 +178,22 @@ static remap_status assemble(const rm_mesh_job *job, rm_arena *arena, const rm_l
   return REMAP_OK;
 }
 
+/* The cell of most negative volume over all ranks, the smallest id if several share it; -1 if none is negative. Collective. */
+static remap_status find_worst_inverted(const rm_comm *comm, rm_mesh *mesh)
+{
+  double  lowest = 0.0, everywhere;
+  int64_t id     = INT64_MIN; /* negated, so that the smallest wins */
+
+  for (rm_lid c = 0; c < mesh->num_cells; c++) lowest = fmin(lowest, mesh->cell_volume[c]);
+  everywhere = lowest;
+  RM_TRY(rm_comm_min_f64(comm, &everywhere, 1));
+  for (rm_lid c = 0; everywhere < 0.0 && lowest <= everywhere && c < mesh->num_cells; c++)
+    if (mesh->cell_volume[c] <= everywhere && -mesh->cell_global[c] > id) id = -mesh->cell_global[c];
+  RM_TRY(rm_comm_max_i64(comm, &id, 1));
+  mesh->worst_inverted = id == INT64_MIN ? -1 : -id;
+  return REMAP_OK;
+}
+
 /* Counts and volume of the whole mesh. Collective. */
 static remap_status sum_up(const rm_comm *comm, rm_mesh *mesh)
 {
@@ -194,7 +210,7 @@ static remap_status sum_up(const rm_comm *comm, rm_mesh *mesh)
   mesh->num_global_cells = count[0];
   mesh->num_inverted     = count[1];
   mesh->volume           = rm_sum_value(&volume);
-  return REMAP_OK;
+  return find_worst_inverted(comm, mesh);
 }
 
 remap_status rm_mesh_build_in(rm_arena *scratch, rm_arena *arena, const rm_comm *comm, remap_side side, const remap_mesh *given,

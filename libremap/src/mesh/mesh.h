@@ -38,6 +38,7 @@ typedef struct rm_mesh {
   const double  (*cell_centroid)[3];/* [num_cells] the same; the box's centre where the volume is 0        */
   rm_gid          num_global_cells; /* over all ranks                                                      */
   rm_gid          num_inverted;     /* over all ranks: cells of negative volume                            */
+  rm_gid          worst_inverted;   /* over all ranks: the one of most negative volume, -1 if there is none */
   double          volume;           /* over all ranks: exact sum of abs(cell_volume), rounded once         */
 } rm_mesh;
 
