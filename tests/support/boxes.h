@@ -201,7 +201,7 @@ static inline void boxes_open_meshes(boxes_world *world, MPI_Comm comm, tm_mesh 
     RT_EQ(rm_mesh_build(world->arena, &world->comm, (remap_side)side, &view[side], &world->frame, REMAP_FACES_CENTRE,
                         &world->mesh[side], &reason),
           REMAP_OK);
-    RT_EQ(rm_stencil_build(world->arena, &world->comm, &world->frame, world->mesh[side], &world->stencil[side]), REMAP_OK);
+    RT_EQ(rm_stencil_build(world->arena, &world->comm, &world->frame, world->mesh[side], NULL, &world->stencil[side]), REMAP_OK);
   }
   for (int side = 0; side < 2; side++) tm_free(part[side]);
 }

@@ -4,6 +4,7 @@
  *   remap_create      take a communicator, get a context             (collective)
  *   remap_set_mesh    lend the source mesh, then the target mesh     (not collective)
  *   remap_build       overlay the two meshes                         (collective)
+ *   remap_set_masks   say which cells give and which want values     (collective)
  *   remap_field       move cell fields across, either way            (collective)
  *   remap_destroy     give everything back                           (collective)
  *
@@ -143,7 +144,9 @@ typedef struct remap_options {
  *
  *  A face is a loop of nodes, its normal (by the right-hand rule) pointing out of face_owner. A face between cells of two
  *  ranks, or of two zones, is given once by each, with neighbour -1: faces join by the coordinates of their nodes. Nodes
- *  are shared or repeated as the caller likes. Coordinates are finite; a face has at least 3 nodes; every cell is closed. */
+ *  are shared or repeated as the caller likes. Coordinates are finite; a face has at least 3 nodes; every cell is closed.
+ *
+ *  What is not set is 0 and NULL: index_base 0 and 64-bit indices then. */
 typedef struct remap_mesh {
   int64_t        num_nodes, num_faces, num_cells;
   const double  *node_xyz;       /**< [num_nodes][3]                                       */
@@ -151,8 +154,13 @@ typedef struct remap_mesh {
   const int64_t *face_node;      /**< [face_offset[num_faces]], 0 <= node < num_nodes      */
   const int64_t *face_owner;     /**< [num_faces], 0 <= cell < num_cells                   */
   const int64_t *face_neighbour; /**< [num_faces], -1 where there is none                  */
+  const int32_t *face_offset32, *face_node32, *face_owner32, *face_neighbour32; /**< each is read where the one above is NULL */
+  int            index_base;     /**< 0 or 1: the number of the first node and cell in these arrays, and face_offset[0]; a
+                                      neighbour below it is none                           */
   const int64_t *cell_global;    /**< [num_cells] distinct over all ranks, >= 0; NULL: numbered rank after rank;
                                       NULL on all ranks or on none, but ranks without cells are free         */
+  const int64_t *cell_place;     /**< [num_cells] where the cell's values stand in the arrays of fields, not counting
+                                      strides: leaves out halo cells; NULL: cell c at place c                */
 
   const char        *name;             /**< used in messages, say the file's name; may be NULL           */
   int64_t            num_zones;        /**< 0 if the mesh has no zones                                   */
@@ -175,11 +183,19 @@ typedef struct remap_field_desc {
   const char   *name;    /**< used in messages; may be NULL */
   remap_nature  nature;
   int           has_old; /**< not 0: out holds old values at entry, in every cell; the same on every rank */
-  const double *in;      /**< [cells of the giving mesh on this rank] borrowed */
-  double       *out;     /**< [cells of the receiving mesh on this rank] borrowed, written */
+  const double *in;      /**< [cells of the giving mesh on this rank, block after block] borrowed */
+  double       *out;     /**< [cells of the receiving mesh on this rank, block after block] borrowed, written */
   int64_t       in_stride, out_stride; /**< doubles from one cell's value to the next one's: n for interleaved q[c * n + k],
                                             with in = q + k; 0 means 1 */
+  const double *const *in_block;  /**< [blocks of the giving mesh] an array per block; NULL: in holds all */
+  double *const       *out_block; /**< [blocks of the receiving mesh] likewise                            */
 } remap_field_desc;
+
+/** Which cells of this rank take part in transfers, by side; [cells, block after block] each, 0 is no; NULL: all do. */
+typedef struct remap_masks {
+  const uint8_t *gives[2]; /**< [side] has values that others may use: 0 in holes and fringes               */
+  const uint8_t *wants[2]; /**< [side] values are to be written: 0 in holes and where the own solver works */
+} remap_masks;
 
 /** What a field's transfer did, over all ranks. */
 typedef struct remap_field_report {
@@ -197,6 +213,7 @@ typedef struct remap_stats {
   int64_t cells[2];               /**< [side] */
   double  volume[2];              /**< [side] sum of abs(cell volume) */
   int64_t inverted_cells[2];      /**< [side] cells of negative volume */
+  int64_t worst_inverted_cell[2]; /**< [side] global id of the one of most negative volume, -1 if there is none */
   int64_t pairs;                  /**< (source cell, target cell) that share volume */
   double  overlap_volume;         /**< sum of V over the pairs */
   int64_t cells_by_cover[2][3];   /**< [side][remap_cover] */
@@ -211,7 +228,7 @@ typedef struct remap_stats {
 } remap_stats;
 
 /** Pairs of one direction as rows of a sparse matrix, one row per receiving cell of this rank. A view: owned by the
- *  context, valid until the next remap_build or remap_destroy. Within a row the order is canonical: it depends on
+ *  context, valid until the next remap_build, remap_set_masks or remap_destroy. Within a row the order is canonical: it depends on
  *  coordinates only. */
 typedef struct remap_pairs_view {
   int64_t        num_rows;   /**< receiving cells on this rank */
@@ -245,9 +262,21 @@ REMAP_API remap_status remap_create(MPI_Comm comm, const remap_options *options,
  *  the last overlay unusable. Errors: BAD_ARGUMENT. */
 REMAP_API remap_status remap_set_mesh(remap_context *ctx, remap_side side, const remap_mesh *mesh);
 
+/** The same for a rank whose part consists of several blocks, each a mesh with nodes and numbers of its own. Cells of a rank are
+ *  numbered block after block in everything that is per cell; faces between blocks join by coordinates like those between
+ *  ranks. Name and zones are the first block's, so a mesh with zones has a block, maybe without cells, on every rank. block is copied, what it points to is borrowed as in remap_set_mesh; num_blocks may
+ *  be 0 and differ between ranks. Not collective. Errors: BAD_ARGUMENT, NO_MEMORY. */
+REMAP_API remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_blocks, const remap_mesh *block);
+
 /** Overlay the two meshes. Collective. Errors: BAD_ORDER (a mesh is missing on this or another rank), BAD_MESH,
  *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
 REMAP_API remap_status remap_build(remap_context *ctx);
+
+/** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build or call, and are
+ *  copied. A pair of cells counts if the one gives and the other wants: coverage, pairs, integrals and reconstruction know no others,
+ *  so what a masked cell holds is never read, not even as a neighbour, and a cell that does not want is never written. NULL: no
+ *  masks. remap_stats stays as it is. Errors: BAD_ORDER (no overlay, or a transfer under way), NO_MEMORY, MPI_FAILURE. */
+REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *masks);
 
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on all of
  *  them. The first call in a direction after a build, and one that asks for more than those before (more fields, order 2, bounds,
@@ -262,7 +291,8 @@ REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction
 /** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them and
  *  sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes. fields and
  *  transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change. One transfer in
- *  each direction may be under way; all ranks start and finish in the same order, and none builds, moves or masks in between.
+ *  each direction and context may be under way; all ranks start and finish them in the same order, and none builds or masks in
+ *  between.
  *  A start that fails does so on all ranks alike and leaves nothing under way; what is wrong with this rank's own values is
  *  told by the finish. Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
 REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
@@ -283,9 +313,13 @@ REMAP_API remap_status remap_get_stats(const remap_context *ctx, remap_stats *ou
  *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY. */
 REMAP_API remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out);
 
-/** How much of each cell of one side is covered by the other mesh. Not collective. fraction and cover, [cells of that side
+/** How much of each cell of one side is covered by cells of the other mesh that give. Not collective. fraction and cover, [cells of that side
  *  on this rank], are the caller's; either may be NULL. Errors: BAD_ORDER. */
 REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover);
+
+/** The cells of one side on this rank that want values and get none, because nothing that gives covers any of them, ascending. Not
+ *  collective. num receives their number; cell [*num] is the caller's and may be NULL. Errors: BAD_ORDER, BAD_ARGUMENT. */
+REMAP_API remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
 
 /** Volumes (signed: negative for an inverted cell) and centroids of the cells of one side. Not collective. volume [cells]
  *  and centroid [cells][3] are the caller's; either may be NULL. Errors: BAD_ORDER. */

@@ -56,20 +56,23 @@ static remap_status report_progress(remap_context *ctx, const char *phase, doubl
   return ctx->options.progress && ctx->options.progress(ctx->options.user, phase, done) ? REMAP_CANCELLED : REMAP_OK;
 }
 
-static remap_status read_meshes(remap_context *ctx, rm_reason *reason)
+static remap_status read_meshes(remap_context *ctx, rm_arena *passing, rm_reason *reason)
 {
+  remap_mesh   given[2];
   remap_status status = REMAP_OK;
 
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     if (!ctx->is_set[side])
       status = rm_fail(REMAP_BAD_ORDER, reason, side, -1, "remap_set_mesh was not called for this mesh");
     else
-      status = copy_labels(ctx->arena, side, &ctx->given[side], &ctx->labels[side], reason);
+      status = rm_context_join_blocks(ctx->arena, passing, side, ctx->num_blocks[side], ctx->block[side], &given[side],
+                                      &ctx->layout[side], reason);
+    if (status == REMAP_OK) status = copy_labels(ctx->arena, side, &given[side], &ctx->labels[side], reason);
   }
   RM_TRY(stage(ctx, status, reason));
-  RM_TRY(rm_frame_build(&ctx->comm, ctx->given, &ctx->frame, reason));
+  RM_TRY(rm_frame_build(&ctx->comm, given, &ctx->frame, reason));
   for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_mesh_build(ctx->arena, &ctx->comm, side, &ctx->given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side], reason));
+    RM_TRY(rm_mesh_build(ctx->arena, &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side], reason));
     RM_TRY(stage(ctx, report_progress(ctx, "reading of meshes", 0.5 * (side + 1)), reason));
   }
   return REMAP_OK;
@@ -150,6 +153,7 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
     s->cells[side]              = ctx->mesh[side]->num_global_cells;
     s->volume[side]             = ctx->mesh[side]->volume * cubed;
     s->inverted_cells[side]     = ctx->mesh[side]->num_inverted;
+    s->worst_inverted_cell[side] = ctx->mesh[side]->worst_inverted;
     s->max_closure_error[side]  = m->max_closure_error[side];
     s->worst_closure_cell[side] = m->worst_closure_cell[side];
     s->zone_overlap[side] *= cubed;
@@ -167,7 +171,7 @@ static remap_status build(remap_context *ctx, rm_arena *passing, rm_reason *reas
   rm_zone_overlap   zones[2];
   double            start = rm_seconds(), magnitude[2];
 
-  RM_TRY(read_meshes(ctx, reason));
+  RM_TRY(read_meshes(ctx, passing, reason));
   RM_TRY(rm_zone_build(passing, &ctx->comm, ctx->mesh, &zone));
   RM_TRY(rm_part_build(passing, &ctx->comm, &ctx->frame, ctx->mesh, zone, &part, reason));
   RM_TRY(find_magnitudes(ctx, magnitude));
@@ -194,13 +198,14 @@ remap_status remap_build(remap_context *ctx)
     return REMAP_BAD_ORDER;
   }
   rm_context_drop_carriers(ctx);
+  ctx->mapping = NULL;
+  rm_context_drop_masks(ctx);
   rm_arena_drop(ctx->arena);
   ctx->arena    = rm_arena_new();
   passing       = rm_arena_new();
   ctx->is_built = false;
   memset(&ctx->stats, 0, sizeof ctx->stats);
   memset(ctx->stencil, 0, sizeof ctx->stencil);
-  memset(ctx->view, 0, sizeof ctx->view);
   memset(ctx->labels, 0, sizeof ctx->labels);
   ctx->seconds_transfer = 0;
   ctx->message[0]       = '\0';
@@ -208,6 +213,7 @@ remap_status remap_build(remap_context *ctx)
   if (status == REMAP_OK) status = build(ctx, passing, &reason);
   rm_arena_drop(passing);
   ctx->is_built = status == REMAP_OK;
+  for (int d = 0; d < 2; d++) ctx->masked[d] = ctx->mapping;
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;
 }

@@ -87,14 +87,23 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
   return REMAP_OK;
 }
 
+remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_blocks, const remap_mesh *block)
+{
+  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(num_blocks >= 0 && (block || num_blocks == 0), REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_grow(&ctx->block[side], &ctx->block_room[side], num_blocks, sizeof *block));
+  for (int b = 0; b < num_blocks; b++) ctx->block[side][b] = block[b];
+  ctx->num_blocks[side] = num_blocks;
+  ctx->is_set[side]     = true;
+  ctx->is_built         = false;
+  ctx->message[0]       = '\0';
+  return REMAP_OK;
+}
+
 remap_status remap_set_mesh(remap_context *ctx, remap_side side, const remap_mesh *mesh)
 {
-  RM_REQUIRE(ctx && mesh && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  ctx->given[side]  = *mesh;
-  ctx->is_set[side] = true;
-  ctx->is_built     = false;
-  ctx->message[0]   = '\0';
-  return REMAP_OK;
+  RM_REQUIRE(mesh, REMAP_BAD_ARGUMENT);
+  return remap_set_blocks(ctx, side, 1, mesh);
 }
 
 remap_status remap_agree(remap_context *ctx, remap_status mine)
@@ -109,7 +118,9 @@ void remap_destroy(remap_context **ctx)
 {
   if (!ctx || !*ctx) return;
   rm_context_drop_carriers(*ctx);
+  rm_context_drop_masks(*ctx);
   rm_arena_drop((*ctx)->arena);
+  for (int side = 0; side < 2; side++) free((*ctx)->block[side]);
   rm_comm_free(&(*ctx)->comm);
   free(*ctx);
   *ctx = NULL;

@@ -15,7 +15,9 @@ typedef struct rm_labels {
 struct remap_context {
   rm_comm       comm;
   remap_options options;
-  remap_mesh    given[2];
+  remap_mesh   *block[2]; /* [side][num_blocks] as lent; malloc'ed */
+  int64_t       block_room[2];
+  int           num_blocks[2];
   bool          is_set[2];
   bool          is_built;
   double        seconds_transfer;
@@ -25,17 +27,31 @@ struct remap_context {
   rm_labels         labels[2];
   rm_frame          frame;
   const rm_mesh    *mesh[2];
+  rm_layout         layout[2];
   const rm_mapping *mapping;
-  const rm_stencil *stencil[2]; /* made when first needed */
+  const rm_stencil *stencil[2]; /* [side] of all cells; made when first needed */
+  remap_pairs_view  view[2];    /* likewise; row_offset NULL until then */
+  remap_stats       stats;
+
+  rm_arena         *mask_arena; /* of what masks change, NULL: there are none */
+  const uint8_t    *gives[2], *wants[2]; /* [side] NULL: all do, on every rank */
+  const rm_mapping *masked[2];           /* [direction] what transfers see; mapping itself without masks */
+  const rm_stencil *giving_stencil[2], *wanting_stencil[2]; /* [side] among cells that give, or want */
   rm_arena         *carrier_arena[2]; /* [direction] of the carrier alone, which is made anew when more has to fit in */
   rm_carrier       *carrier[2];       /* [direction] NULL until needed                                                */
   rm_load           load[2];          /* [direction] that the carrier is made for                                     */
-  remap_pairs_view  view[2];    /* likewise; row_offset NULL until then */
-  remap_stats       stats;
 };
 
 /* Put what *reason says about a failure into the context's message, with mesh, zone and cell by name. Not collective. */
 void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason);
+
+/* What room mesh reads of one side: the blocks in one, with 64-bit indices from 0. Arrays are the caller's where they are so
+ * already, else in passing; layout lives in arena. Not collective. BAD_MESH, TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side, int num_blocks, const remap_mesh *block,
+                                    remap_mesh *out, rm_layout *layout, rm_reason *reason);
+
+/* Forget masks. Not collective. */
+void rm_context_drop_masks(remap_context *ctx);
 
 /* Is a transfer under way in either direction? */
 bool rm_context_is_busy(const remap_context *ctx);

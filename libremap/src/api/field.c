@@ -28,17 +28,28 @@ static remap_status check_agreed(const remap_context *ctx, remap_direction direc
   return REMAP_OK;
 }
 
+/* Is a field's array, or that of a block with cells, missing? */
+static bool is_missing(const void *all, const void *const *block, bool is_by_block, const rm_layout *layout)
+{
+  const int num = layout->num_blocks;
+
+  if (!is_by_block) return !all && num > 0 && layout->block_offset[num] > 0;
+  for (int b = 0; b < num; b++)
+    if (!block[b] && layout->block_offset[b] < layout->block_offset[b + 1]) return true;
+  return false;
+}
+
 /* What this rank alone passes. */
 static remap_status check_own(const remap_context *ctx, remap_direction direction, int num_fields, const remap_field_desc *fields,
                               rm_reason *reason)
 {
   const remap_side giving = giver_of(direction);
-  const bool       gives = ctx->mesh[giving]->num_cells > 0, receives = ctx->mesh[1 - giving]->num_cells > 0;
 
   for (int k = 0; k < num_fields; k++) {
     const remap_field_desc *f = &fields[k];
 
-    if ((!f->in && gives) || (!f->out && receives))
+    if (is_missing(f->in, (const void *const *)f->in_block, f->in_block != NULL, &ctx->layout[giving]) ||
+        is_missing(f->out, (const void *const *)f->out_block, f->out_block != NULL, &ctx->layout[1 - giving]))
       return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: in or out is NULL on a rank that has cells",
                      f->name ? f->name : "?");
     if (f->in_stride < 0 || f->out_stride < 0)
@@ -69,37 +80,54 @@ static remap_status check_marks(const remap_context *ctx, uint64_t mark, rm_reas
                                              "direction, transfer, number, natures or old values of fields differ between ranks");
 }
 
-static rm_transfer_setup setup_of(const remap_context *ctx, remap_direction direction)
+/* The stencil among the cells that take part in a role; one of all cells serves both where nothing is masked. */
+static const rm_stencil **stencil_of(remap_context *ctx, remap_side side, bool is_giving)
 {
-  const remap_side giving = giver_of(direction), receiving = 1 - giving;
+  if (is_giving) return ctx->gives[side] ? &ctx->giving_stencil[side] : &ctx->stencil[side];
+  return ctx->wants[side] ? &ctx->wanting_stencil[side] : &ctx->stencil[side];
+}
+
+static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction)
+{
+  const remap_side  giving = giver_of(direction), receiving = 1 - giving;
+  const rm_mapping *mapping = ctx->masked[direction];
 
   return (rm_transfer_setup){.comm              = &ctx->comm,
                              .frame             = &ctx->frame,
                              .giving            = ctx->mesh[giving],
                              .receiving         = ctx->mesh[receiving],
-                             .rows              = &ctx->mapping->rows[receiving],
-                             .giving_rows       = &ctx->mapping->rows[giving],
-                             .giving_stencil    = ctx->stencil[giving],
-                             .receiving_stencil = ctx->stencil[receiving],
-                             .any_partial       = ctx->mapping->cells_by_cover[receiving][REMAP_PARTIAL] > 0,
-                             .any_uncovered     = ctx->mapping->cells_by_cover[receiving][REMAP_UNCOVERED] > 0};
+                             .rows              = &mapping->rows[receiving],
+                             .giving_rows       = &mapping->rows[giving],
+                             .giving_stencil    = *stencil_of(ctx, giving, true),
+                             .receiving_stencil = *stencil_of(ctx, receiving, false),
+                             .giving_layout     = ctx->layout[giving],
+                             .receiving_layout  = ctx->layout[receiving],
+                             .any_partial       = mapping->cells_by_cover[receiving][REMAP_PARTIAL] > 0,
+                             .any_uncovered     = mapping->cells_by_cover[receiving][REMAP_UNCOVERED] > 0};
+}
+
+/* Make the stencil that a side needs in a role, unless it is there. Collective. */
+static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_giving)
+{
+  const rm_stencil **stencil = stencil_of(ctx, side, is_giving);
+  const uint8_t     *mask    = is_giving ? ctx->gives[side] : ctx->wants[side];
+
+  if (*stencil) return REMAP_OK;
+  return rm_stencil_build(mask ? ctx->mask_arena : ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil);
 }
 
 /* Make the carrier that a load needs, and what it rests on. Collective. */
 static remap_status prepare(remap_context *ctx, remap_direction direction, rm_load load, rm_reason *reason)
 {
-  const remap_side giving    = giver_of(direction);
-  const bool       needed[2] = {giving == REMAP_SOURCE ? load.has_slopes : load.has_nearest,
-                                giving == REMAP_TARGET ? load.has_slopes : load.has_nearest};
+  const remap_side giving = giver_of(direction);
 
-  for (int side = 0; side < 2; side++)
-    if (needed[side] && !ctx->stencil[side])
-      RM_TRY(rm_stencil_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh[side], &ctx->stencil[side]));
   if (ctx->carrier[direction]) load = rm_load_max(load, ctx->load[direction]);
   rm_arena_drop(ctx->carrier_arena[direction]);
   ctx->carrier[direction]       = NULL;
   ctx->carrier_arena[direction] = rm_arena_new();
   RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
+  if (load.has_nearest) RM_TRY(need_stencil(ctx, 1 - giving, false));
   const rm_transfer_setup setup = setup_of(ctx, direction);
   RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));
   ctx->load[direction] = load;

@@ -1,6 +1,11 @@
 /* views -- what callers may look at after remap_build, in their own unit. */
-#include <string.h>
 #include "api/context.h"
+
+/* The pairs of a side's cells as receivers, those of masked cells left out. */
+static const rm_rows *rows_of(const remap_context *ctx, remap_side side)
+{
+  return &ctx->masked[side == REMAP_TARGET ? REMAP_FORWARD : REMAP_BACKWARD]->rows[side];
+}
 
 remap_status remap_get_stats(const remap_context *ctx, remap_stats *out)
 {
@@ -30,7 +35,7 @@ remap_status remap_coverage(const remap_context *ctx, remap_side side, double *f
 {
   RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
   RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
-  const rm_rows *rows = &ctx->mapping->rows[side];
+  const rm_rows *rows = rows_of(ctx, side);
 
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     double sum = 0;
@@ -42,11 +47,28 @@ remap_status remap_coverage(const remap_context *ctx, remap_side side, double *f
   return REMAP_OK;
 }
 
+remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell)
+{
+  RM_REQUIRE(ctx && num && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  const rm_rows *rows = rows_of(ctx, side);
+  int64_t        n    = 0;
+
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    if (rows->cover[c] != REMAP_UNCOVERED) continue;
+    if (cell) cell[n] = c;
+    n++;
+  }
+  *num = n;
+  return REMAP_OK;
+}
+
 remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out)
 {
   RM_REQUIRE(ctx && out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
   RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
-  const rm_rows    *rows = &ctx->mapping->rows[direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE];
+  const rm_rows    *rows = rows_of(ctx, direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE);
+  rm_arena         *arena = ctx->mask_arena ? ctx->mask_arena : ctx->arena;
   const double      unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
   const int64_t     n = rows->offset[rows->num_cells];
   remap_pairs_view *view = &ctx->view[direction];
@@ -55,10 +77,10 @@ remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pa
   double           *volume, *moment;
 
   if (!view->row_offset) {
-    RM_NEW(global, ctx->arena, n);
-    RM_NEW(rank, ctx->arena, n);
-    RM_NEW(volume, ctx->arena, n);
-    RM_NEW(moment, ctx->arena, 3 * n);
+    RM_NEW(global, arena, n);
+    RM_NEW(rank, arena, n);
+    RM_NEW(volume, arena, n);
+    RM_NEW(moment, arena, 3 * n);
     for (int64_t k = 0; k < n; k++) {
       global[k] = rows->giver_global[rows->giver[k]];
       rank[k]   = rows->giver_rank[rows->giver[k]];

@@ -156,8 +156,31 @@ void rm_carrier_abandon(rm_carrier *c)
 
 /* ---- start ------------------------------------------------------------------------------------------------------- */
 
-/* Where a cell's value stands in the caller's array. */
-static int64_t place_of(const rm_lid *place, rm_lid cell, int64_t stride) { return (place ? place[cell] : cell) * (stride ? stride : 1); }
+/* The values of one block of one field: of cells first to end - 1, that of cell i at array + stride * (place[i] or i - zero). */
+typedef struct strip {
+  const rm_layout *layout;
+  rm_lid           first, end, zero;
+  int64_t          stride;
+} strip;
+
+static int num_strips(const rm_layout *layout) { return layout->num_blocks > 0 ? layout->num_blocks : 1; }
+
+static strip strip_of(const rm_layout *layout, rm_lid num_cells, int block, bool is_by_block, int64_t stride)
+{
+  strip s = {layout, 0, num_cells, 0, stride ? stride : 1};
+
+  if (layout->num_blocks > 0) {
+    s.first = layout->block_offset[block];
+    s.end   = layout->block_offset[block + 1];
+  }
+  if (is_by_block) s.zero = s.first;
+  return s;
+}
+
+static int64_t place_of(const strip *s, rm_lid cell)
+{
+  return (s->layout->place ? s->layout->place[cell] : cell - s->zero) * s->stride;
+}
 
 static remap_status bad_value(const rm_carrier *c, int f, const rm_mesh *mesh, rm_lid cell, double value, const char *which,
                               rm_reason *reason)
@@ -170,37 +193,49 @@ static remap_status bad_value(const rm_carrier *c, int f, const rm_mesh *mesh, r
 }
 
 /* Values of the giving cells. Those that nobody may have count as 0, whatever stands there. */
-static remap_status gather_given(rm_carrier *c, rm_reason *reason)
+static remap_status gather_given(rm_carrier *c, int f, rm_reason *reason)
 {
-  const rm_mesh *mesh = c->setup.giving;
-  const int      num  = c->packing.num_fields;
+  const rm_mesh          *mesh   = c->setup.giving;
+  const remap_field_desc *field  = &c->fields[f];
+  const rm_layout        *layout = &c->setup.giving_layout;
+  const int               num    = c->packing.num_fields;
 
-  for (int f = 0; f < num; f++)
-    for (rm_lid i = 0; i < mesh->num_cells; i++) {
-      const bool   is_given = c->setup.giving_rows->cover[i] != REMAP_UNWANTED;
-      const double value    = is_given ? c->fields[f].in[place_of(c->setup.giving_place, i, c->fields[f].in_stride)] : 0.0;
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip   s  = strip_of(layout, mesh->num_cells, b, field->in_block != NULL, field->in_stride);
+    const double *in = field->in_block ? field->in_block[b] : field->in;
+
+    for (rm_lid i = s.first; i < s.end; i++) {
+      const double value = c->setup.giving_rows->cover[i] != REMAP_UNWANTED ? in[place_of(&s, i)] : 0.0;
 
       if (!isfinite(value)) return bad_value(c, f, mesh, i, value, "the", reason);
       c->given[(int64_t)i * num + f] = value;
     }
+  }
   return REMAP_OK;
 }
 
-/* Old values, where they are used. */
-static remap_status gather_old(rm_carrier *c, rm_reason *reason)
-{
-  const rm_mesh *mesh  = c->setup.receiving;
-  const uint8_t *cover = c->setup.rows->cover;
-  const int      num   = c->packing.num_fields;
+/* Where the values of a block's receiving cells go. */
+static double *out_of(const remap_field_desc *field, int block) { return field->out_block ? field->out_block[block] : field->out; }
 
-  for (int f = 0; f < num; f++)
-    for (rm_lid i = 0; i < mesh->num_cells; i++) {
-      const bool   is_kept = rm_keeps_old(&c->how, &c->fields[f], cover[i]);
-      const double value   = is_kept ? c->fields[f].out[place_of(c->setup.receiving_place, i, c->fields[f].out_stride)] : 0.0;
+/* Old values, where they are used. */
+static remap_status gather_old(rm_carrier *c, int f, rm_reason *reason)
+{
+  const rm_mesh          *mesh   = c->setup.receiving;
+  const remap_field_desc *field  = &c->fields[f];
+  const rm_layout        *layout = &c->setup.receiving_layout;
+  const int               num    = c->packing.num_fields;
+
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip   s   = strip_of(layout, mesh->num_cells, b, field->out_block != NULL, field->out_stride);
+    const double *out = out_of(field, b);
+
+    for (rm_lid i = s.first; i < s.end; i++) {
+      const double value = rm_keeps_old(&c->how, field, c->setup.rows->cover[i]) ? out[place_of(&s, i)] : 0.0;
 
       if (!isfinite(value)) return bad_value(c, f, mesh, i, value, "the old", reason);
       c->value[(int64_t)i * num + f] = value;
     }
+  }
   return REMAP_OK;
 }
 
@@ -263,8 +298,10 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
   for (int f = 0; f < num_fields; f++) c->limited[f] = 0;
   lay_out(c, num_fields);
-  if (c->note.status == REMAP_OK) note(c, gather_given(c, &c->reason));
-  if (c->note.status == REMAP_OK) note(c, gather_old(c, &c->reason));
+  for (int f = 0; f < num_fields; f++) {
+    if (c->note.status == REMAP_OK) note(c, gather_given(c, f, &c->reason));
+    if (c->note.status == REMAP_OK) note(c, gather_old(c, f, &c->reason));
+  }
   if (c->note.status == REMAP_OK) note(c, check_coverage(c, &c->reason));
   if (num_fields == 0) return;
   if (reads_halo(c)) {
@@ -379,15 +416,20 @@ static remap_status agree_and_report(rm_carrier *c, remap_field_report *reports)
   return status;
 }
 
-/* Into the caller's arrays. */
-static void write_values(const rm_carrier *c)
+/* Into the caller's array. */
+static void write_values(const rm_carrier *c, int f)
 {
-  const int num = c->packing.num_fields;
+  const remap_field_desc *field  = &c->fields[f];
+  const rm_layout        *layout = &c->setup.receiving_layout;
+  const int               num    = c->packing.num_fields;
 
-  for (int f = 0; f < num; f++)
-    for (rm_lid i = 0; i < c->setup.receiving->num_cells; i++)
-      if (c->setup.rows->cover[i] != REMAP_UNWANTED)
-        c->fields[f].out[place_of(c->setup.receiving_place, i, c->fields[f].out_stride)] = c->value[(int64_t)i * num + f];
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip s   = strip_of(layout, c->setup.receiving->num_cells, b, field->out_block != NULL, field->out_stride);
+    double     *out = out_of(field, b);
+
+    for (rm_lid i = s.first; i < s.end; i++)
+      if (c->setup.rows->cover[i] != REMAP_UNWANTED) out[place_of(&s, i)] = c->value[(int64_t)i * num + f];
+  }
 }
 
 remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *reports, rm_reason *reason)
@@ -410,7 +452,7 @@ remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *
     reports[f].target_integral *= cubed;
   }
   if (status == REMAP_OK) {
-    write_values(c);
+    for (int f = 0; f < num; f++) write_values(c, f);
     return REMAP_OK;
   }
   *reason = c->reason;

@@ -21,9 +21,16 @@ typedef struct rm_stencil {
   const rm_plan *plan;              /* brings the halo's values: received item k is halo cell k              */
 } rm_stencil;
 
-/* Collective. Lives in arena. */
+/* takes_part [num_cells]: 0 for cells that are nobody's neighbour; NULL: all are. Collective. Lives in arena. */
 remap_status rm_stencil_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
-                              const rm_stencil **out);
+                              const uint8_t *takes_part, const rm_stencil **out);
+
+/* Where the values of a mesh's cells stand in the caller's arrays. */
+typedef struct rm_layout {
+  int            num_blocks;   /* 0: one block of all cells                                                    */
+  const rm_lid  *block_offset; /* [num_blocks + 1] the cells of block b                                         */
+  const int64_t *place;        /* [num_cells] place in its array, NULL: the number within what the array is of  */
+} rm_layout;
 
 /* What a transfer needs; everything is borrowed. */
 typedef struct rm_transfer_setup {
@@ -34,8 +41,7 @@ typedef struct rm_transfer_setup {
   const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals  */
   const rm_stencil *giving_stencil; /* NULL if order 1                                               */
   const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
-  const rm_lid     *giving_place;   /* [giving cells] where a cell's values stand in the caller's arrays, NULL: at its number */
-  const rm_lid     *receiving_place; /* [receiving cells] likewise                                   */
+  rm_layout         giving_layout, receiving_layout;
   bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 

@@ -32,8 +32,9 @@ typedef struct draft {
   rm_arena      *arena, *scratch;
   const rm_comm *comm;
   const rm_mesh *mesh;
+  const uint8_t *takes_part;       /* [num_cells] 0: nobody's neighbour; NULL: all are */
   int64_t       *node_cell_offset; /* [num_nodes + 1] */
-  rm_lid        *node_cell;
+  rm_lid        *node_cell;        /* cells that take part */
   int64_t       *node_halo_offset; /* [num_nodes + 1] */
   rm_lid        *node_halo;        /* num_cells + place in the halo */
   int           *halo_rank;        /* [num_halo] */
@@ -66,6 +67,8 @@ static int64_t nodes_of_cell(const rm_mesh *mesh, rm_lid cell, rm_lid *last_cell
   return num;
 }
 
+static bool takes_part(const draft *d, rm_lid cell) { return !d->takes_part || d->takes_part[cell]; }
+
 static remap_status list_nodes(draft *d, rm_stencil *stencil)
 {
   const rm_mesh *mesh = d->mesh;
@@ -83,11 +86,12 @@ static remap_status list_nodes(draft *d, rm_stencil *stencil)
   RM_NEW0(d->node_cell_offset, d->scratch, (int64_t)mesh->num_nodes + 1);
   RM_NEW(d->node_cell, d->scratch, offset[mesh->num_cells]);
   RM_NEW(next, d->scratch, mesh->num_nodes);
-  for (int64_t k = 0; k < offset[mesh->num_cells]; k++) d->node_cell_offset[node[k]]++;
+  for (rm_lid c = 0; c < mesh->num_cells; c++)
+    for (int64_t k = offset[c]; k < offset[c + 1] && takes_part(d, c); k++) d->node_cell_offset[node[k]]++;
   rm_offsets(d->node_cell_offset, mesh->num_nodes);
   for (rm_lid k = 0; k < mesh->num_nodes; k++) next[k] = d->node_cell_offset[k];
   for (rm_lid c = 0; c < mesh->num_cells; c++)
-    for (int64_t k = offset[c]; k < offset[c + 1]; k++) d->node_cell[next[node[k]]++] = c;
+    for (int64_t k = offset[c]; k < offset[c + 1] && takes_part(d, c); k++) d->node_cell[next[node[k]]++] = c;
   stencil->num_cells   = mesh->num_cells;
   stencil->node_offset = offset;
   stencil->node        = node;
@@ -434,10 +438,10 @@ static remap_status weigh_neighbours(draft *d, rm_stencil *stencil)
 }
 
 remap_status rm_stencil_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
-                              const rm_stencil **out)
+                              const uint8_t *takes, const rm_stencil **out)
 {
   rm_stencil  *stencil = rm_arena_zero(arena, 1, sizeof *stencil);
-  draft        d       = {.arena = arena, .scratch = rm_arena_new(), .comm = comm, .mesh = mesh};
+  draft        d       = {.arena = arena, .scratch = rm_arena_new(), .comm = comm, .mesh = mesh, .takes_part = takes};
   remap_status status  = stencil && d.scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = list_nodes(&d, stencil);

@@ -22,7 +22,7 @@ typedef struct rm_rows {
   const double  *volume;       /* [same] V, own frame                                                      */
   const double (*moment)[3];   /* [same] integral of (x - c), c the GIVING cell's centroid                 */
   const uint8_t *same;         /* [same]                                                                   */
-  const uint8_t *cover;        /* [num_cells] remap_cover                                                  */
+  const uint8_t *cover;        /* [num_cells] remap_cover; UNWANTED only by rm_mapping_mask                */
   const double (*centroid_error)[3]; /* [num_cells] true centroid less rm_mesh's, by which moments about the latter do not add
                                   up to 0: what rounding took, at most 2^-48 of it; 0 where the pairs do not tell it (cells
                                   that are not covered) or nobody needs it (same)                          */
@@ -47,6 +47,12 @@ typedef struct rm_mapping {
  * leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
+/* The same mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving cells] and
+ * gives [giving cells], 0 is no. Of the receiving side: cells that do not want are UNWANTED, without pairs; others lose pairs, and
+ * are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is left. Collective. Lives in
+ * arena and borrows from mapping. O(pairs). */
+remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapping *mapping, remap_side receiving,
+                             const uint8_t *wants, const uint8_t *gives, const rm_mapping **out);
 /* Every invariant that one rank can see; slow. Not collective. */
 remap_status rm_mapping_check(const rm_mapping *mapping, const rm_mesh *const mesh[2]);
 
