@@ -73,6 +73,7 @@ adflow() {
   integral Pressure 24402589.8404 1e-9
   integral TurbulentSANuTilde 14.7251100649 1e-9
   for field in Density VelocityX VelocityY VelocityZ Pressure TurbulentSANuTilde; do bounded "$field"; done
+  [ "$(value overlap pairs)" = 24192 ] || complain "$(value overlap pairs) pairs"
   [ "$(value overlap target_covered)" = 24192 ] || complain "cells are lost"
   hold "$wrong" "a wing of 38 blocks onto itself, rind stripped"
 }
