@@ -23,6 +23,16 @@ static const char *nature_word(remap_nature nature)
   return "unknown";
 }
 
+/* "Base/Zone: cell 7 (counted from 1)" for a global cell; text has room for size bytes. */
+static const char *cell_words(const rcgns_info *info, int64_t cell, char *text, size_t size)
+{
+  int64_t z = info->num_zones - 1;
+
+  while (z > 0 && info->zone[z].first_cell > cell) z--;
+  snprintf(text, size, "%s: cell %lld (counted from 1)", info->zone[z].name, (long long)(cell - info->zone[z].first_cell + 1));
+  return text;
+}
+
 /* ---- text --------------------------------------------------------------------------------------------------------- */
 
 static const char *plural(int64_t count) { return count == 1 ? "" : "s"; }
@@ -54,6 +64,14 @@ void cli_report_overlap(FILE *out, const cli_report *report)
     fprintf(out, "%-8s%18.12g %12lld %12lld %12lld %10.1e\n", side_word[side], stats->volume[side],
             (long long)stats->cells_by_cover[side][REMAP_COVERED], (long long)stats->cells_by_cover[side][REMAP_PARTIAL],
             (long long)stats->cells_by_cover[side][REMAP_UNCOVERED], stats->max_closure_error[side]);
+  for (int side = 0; side < 2; side++) {
+    const int64_t n = stats->inverted_cells[side];
+    char          cell[256];
+
+    if (n > 0)
+      fprintf(out, "%s: %lld inverted cell%s, the worst is %s\n", side_word[side], (long long)n, plural(n),
+              cell_words(report->info[side], stats->worst_inverted_cell[side], cell, sizeof cell));
+  }
   fflush(out);
 }
 
@@ -102,11 +120,14 @@ static json_t *real(double value)
 
 static json_t *side_json(const cli_report *report, remap_side side)
 {
-  const rcgns_info *info = report->info[side];
+  const rcgns_info *info  = report->info[side];
+  const int64_t     worst = report->stats.worst_inverted_cell[side];
+  char              cell[256];
 
-  return json_pack("{s:s, s:I, s:I, s:o, s:I, s:s?}", "file", info->path, "zones", (json_int_t)info->num_zones, "cells",
+  return json_pack("{s:s, s:I, s:I, s:o, s:I, s:s?, s:s?}", "file", info->path, "zones", (json_int_t)info->num_zones, "cells",
                    (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "inverted_cells",
-                   (json_int_t)report->stats.inverted_cells[side], "solution", report->solution[side]);
+                   (json_int_t)report->stats.inverted_cells[side], "worst_inverted_cell",
+                   worst < 0 ? NULL : cell_words(info, worst, cell, sizeof cell), "solution", report->solution[side]);
 }
 
 static json_t *overlap_json(const remap_stats *stats)
