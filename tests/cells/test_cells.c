@@ -1,172 +1,5 @@
 /* The supermesh of small meshes: closed cells, volumes against the moments, faces against the faces they came from, conformity. */
-#include "cells/cells.h"
-#include "laid.h"
-#include "rt.h"
-
-typedef struct super {
-  laid           *l;
-  const rm_cells *cells;
-  remap_status    status;
-} super;
-
-static super super_of(const tm_mesh *source, const tm_mesh *target, remap_faces faces, const laid_how *how, int keep)
-{
-  super s = {laid_over(source, target, faces, how), NULL, REMAP_OK};
-
-  s.status = s.l->status == REMAP_OK ? rm_cells_build(s.l->arena, &s.l->part, s.l->overlay, keep, &s.cells, &s.l->reason) : s.l->status;
-  return s;
-}
-
-/* ---- what a supermesh must be -------------------------------------------------------------------------------------------- */
-
-static void area_vector(const rm_cells *m, rm_lid f, double out[3])
-{
-  const rm_lid *v = m->face_vertex + m->face_offset[f];
-  const double *o = m->vertex[v[0]];
-
-  out[0] = out[1] = out[2] = 0;
-  for (int64_t k = 1; k + 1 < m->face_offset[f + 1] - m->face_offset[f]; k++) {
-    double a[3], b[3];
-    for (int c = 0; c < 3; c++) a[c] = m->vertex[v[k]][c] - o[c], b[c] = m->vertex[v[k + 1]][c] - o[c];
-    for (int c = 0; c < 3; c++) out[c] += .5 * (a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3]);
-  }
-}
-
-/* Volumes by pair are those of the moments, and there are no other pairs. */
-static void volumes_are_right(const super *s)
-{
-  const laid       *l = s->l;
-  const rm_moments *p = l->moments;
-  const rm_lid      n[2] = {l->mesh[0]->num_cells, l->mesh[1]->num_cells};
-  double           *sum = tm_alloc_((int64_t)n[0] * n[1], sizeof *sum), *row[2] = {tm_alloc_(n[0], sizeof(double)), tm_alloc_(n[1], sizeof(double))};
-
-  for (rm_lid c = 0; c < s->cells->num_cells; c++) {
-    const rm_lid *a = s->cells->cell_ancestor[c];
-    if (a[0] >= 0 && a[1] >= 0) sum[(int64_t)a[0] * n[1] + a[1]] += s->cells->cell_volume[c];
-    for (int side = 0; side < 2; side++)
-      if (a[side] >= 0) row[side][a[side]] += s->cells->cell_volume[c];
-  }
-  for (int64_t k = 0; k < p->num_pairs; k++) {
-    const double least = fmin(l->part.piece[0].cell_volume[p->source[k]], l->part.piece[1].cell_volume[p->target[k]]);
-    double      *x = &sum[(int64_t)p->source[k] * n[1] + p->target[k]];
-    if (p->volume[k] > 1e-13 * least) RT_CHECK(*x > 0);
-    RT_NEAR(*x, p->volume[k], 1e-12 * least);
-    *x = 0;
-  }
-  for (int64_t k = 0; k < (int64_t)n[0] * n[1]; k++) RT_CHECK(sum[k] == 0);
-  for (int side = 0; side < 2; side++)
-    for (rm_lid c = 0; c < n[side]; c++)
-      RT_NEAR(row[side][c], l->part.piece[side].cell_volume[c], 1e-12 * l->part.piece[side].cell_volume[c]);
-  free(sum);
-  for (int side = 0; side < 2; side++) free(row[side]);
-}
-
-/* The faces that came from a face of an operand cover it, once. */
-static void faces_are_covered(const super *s)
-{
-  for (int side = 0; side < 2; side++) {
-    const rm_trimesh *m   = s->l->mesh[side];
-    const rm_lid      n   = s->l->part.piece[side].num_faces;
-    double           *sum = tm_alloc_(n, sizeof *sum), *area = tm_alloc_(n, sizeof *area), worst = 0;
-
-    for (rm_lid f = 0; f < s->cells->num_faces; f++) {
-      const rm_lid t = s->cells->face_triangle[f][side];
-      double       a[3];
-      area_vector(s->cells, f, a);
-      if (t >= 0) sum[m->triangle_face[t]] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-    }
-    for (rm_lid t = 0; t < m->num_triangles; t++) {
-      const double *v = m->normal[t];
-      if (t && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle)) continue; /* counts as the first that lies there */
-      area[m->triangle_face[t]] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    }
-    for (rm_lid f = 0; f < n; f++)
-      if (area[f] > 0) worst = fmax(worst, fabs(sum[f] - area[f]) / area[f]);
-    RT_NEAR(worst, 0, 1e-12);
-    free(sum);
-    free(area);
-  }
-}
-
-/* No vertex lies inside an edge of a face. */
-static void edges_are_whole(const super *s)
-{
-  const rm_cells *m = s->cells;
-  int64_t         bad = 0;
-
-  for (rm_lid f = 0; f < m->num_faces; f++)
-    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) {
-      const double *a = m->vertex[m->face_vertex[k]], *b = m->vertex[m->face_vertex[k + 1 < m->face_offset[f + 1] ? k + 1 : m->face_offset[f]]];
-      for (rm_lid v = 0; v < m->num_vertices; v++) {
-        const double *p = m->vertex[v];
-        double        uu = 0, up = 0, off = 0;
-        for (int c = 0; c < 3; c++) uu += (b[c] - a[c]) * (b[c] - a[c]), up += (p[c] - a[c]) * (b[c] - a[c]);
-        if (p == a || p == b || up < 0 || up > uu) continue;
-        for (int c = 0; c < 3; c++) off = fmax(off, fabs(p[c] - a[c] - up / uu * (b[c] - a[c])));
-        bad += off < 1e-13;
-      }
-    }
-  RT_EQ(bad, 0);
-}
-
-typedef struct use {
-  rm_lid cell, low, high;
-} use;
-static int by_use(const void *a, const void *b) { return memcmp(a, b, sizeof(use)); }
-
-/* Every edge of a cell lies in two of its faces, and V - E + F of every cell is 2 times its shells. */
-static void cells_are_manifold(const super *s, int shells)
-{
-  const rm_cells *m    = s->cells;
-  use            *list = tm_alloc_(2 * m->face_offset[m->num_faces], sizeof *list);
-  rm_lid         *euler = tm_alloc_(m->num_cells, sizeof *euler), *seen = tm_alloc_(m->num_vertices, sizeof *seen), more = 0;
-  int64_t         n = 0, odd = 0;
-
-  for (rm_lid f = 0; f < m->num_faces; f++)
-    for (int h = 0; h < 2; h++) {
-      if (m->face_cell[f][h] < 0) continue;
-      euler[m->face_cell[f][h]]++;
-      for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) {
-        const rm_lid a = m->face_vertex[k], b = m->face_vertex[k + 1 < m->face_offset[f + 1] ? k + 1 : m->face_offset[f]];
-        list[n++]      = (use){m->face_cell[f][h], a < b ? a : b, a < b ? b : a};
-      }
-    }
-  qsort(list, (size_t)n, sizeof *list, by_use);
-  for (int64_t k = 0; k < n; k += 2) {
-    odd += k + 1 == n || by_use(&list[k], &list[k + 1]) || (k + 2 < n && !by_use(&list[k], &list[k + 2]));
-    euler[list[k].cell]--;
-  }
-  RT_EQ(odd, 0);
-  memset(seen, -1, sizeof *seen * (size_t)m->num_vertices);
-  for (int pass = 0; pass < 2; pass++) { /* vertices of a cell: those of its edges; lists ascend by bytes, cells stand together */
-    for (int64_t k = 0; k < n && pass == 0; k++)
-      for (int h = 0; h < 2; h++) {
-        const rm_lid v = h ? list[k].high : list[k].low;
-        if (seen[v] == list[k].cell) continue;
-        seen[v] = list[k].cell;
-        euler[list[k].cell]++;
-      }
-  }
-  for (rm_lid c = 0; c < m->num_cells; c++) more += euler[c] != 2;
-  if (shells >= 0) RT_EQ(more, shells);
-  free(list);
-  free(euler);
-  free(seen);
-}
-
-/* Cells whose V - E + F is not 2: with a void or a hole through them. */
-static void supermesh_is_right(const super *s, int odd_cells)
-{
-  if (!RT_EQ(s->status, REMAP_OK)) {
-    fprintf(stderr, "%s\n", s->l->reason.text);
-    return;
-  }
-  RT_EQ(rm_cells_check(s->cells), REMAP_OK);
-  volumes_are_right(s);
-  faces_are_covered(s);
-  if (odd_cells >= 0) edges_are_whole(s);
-  cells_are_manifold(s, odd_cells);
-}
+#include "super.h"
 
 /* Both triangulations, both ways round; the meshes are given up. */
 static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
@@ -174,7 +7,7 @@ static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
   for (int way = 0; way < 4; way++) {
     super s = super_of(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
 
-    supermesh_is_right(&s, odd_cells);
+    super_check(&s, odd_cells, odd_cells >= 0);
     laid_free(s.l);
   }
   tm_free(a);
@@ -267,9 +100,144 @@ static void refined_on_mixed(void)
   agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, NULL, NULL), tm_mixed((int[]){3, 3, 3}, tm_warp, &w), -1);
 }
 
+/* ---- booleans ----------------------------------------------------------------------------------------------------------------------- */
+
+static const int every_keep[] = {RM_CELLS_IN_BOTH, RM_CELLS_IN_SOURCE, RM_CELLS_IN_TARGET, RM_CELLS_WHOLE_SOURCE, RM_CELLS_UNION};
+
+typedef struct amount {
+  rm_lid cells;
+  double volume;
+} amount;
+
+static amount amount_of(const tm_mesh *a, const tm_mesh *b, int keep)
+{
+  super  s   = super_of(a, b, REMAP_FACES_CENTRE, NULL, keep);
+  amount got = {-1, NAN};
+
+  if (RT_EQ(s.status, REMAP_OK)) {
+    RT_EQ(rm_cells_check(s.cells), REMAP_OK);
+    got = (amount){s.cells->num_cells, 0};
+    for (rm_lid c = 0; c < s.cells->num_cells; c++) got.volume += s.cells->cell_volume[c];
+  }
+  laid_free(s.l);
+  return got;
+}
+
+static void operations_add_up(void)
+{
+  const tm_warping w = {0.03, 0.7};
+  tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
+                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
+                         {tm_tetrahedra((int[]){3, 2, 2}, tm_warp, &w), tm_hexahedra((int[]){2, 2, 2}, NULL, NULL)}};
+
+  for (int k = 0; k < 3; k++) {
+    double       v[5];
+
+    for (int h = 0; h < 5; h++) v[h] = amount_of(pair[k][0], pair[k][1], every_keep[h]).volume;
+    RT_CHECK(v[0] > 0);
+    RT_NEAR(v[4], v[0] + v[1] + v[2], 1e-12 * v[4]);
+    RT_NEAR(v[3], v[0] + v[1], 1e-12 * v[4]);
+    for (int side = 0; side < 2; side++) tm_free(pair[k][side]);
+  }
+}
+
+/* The faces of a mesh may be quadrangles, so the union has as many cells, faces and vertices as the mesh. */
+static void identical_operands_are_their_union_and_leave_no_difference(void)
+{
+  tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&two, &three, &four, NULL);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+
+  if (RT_EQ(s.status, REMAP_OK)) {
+    RT_EQ(s.cells->num_cells, a->view.num_cells);
+    RT_EQ(s.cells->num_faces, a->view.num_faces);
+    RT_EQ(s.cells->num_vertices, a->view.num_nodes);
+  }
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 0);
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 0);
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+}
+
+static void operands_with_one_skin_leave_no_difference(void)
+{
+  tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&three, &two, &one, NULL);
+
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 0);
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 0);
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 4 * 4 * 4);
+  tm_free(a);
+  tm_free(b);
+}
+
+static void abutting_operands_share_faces_and_no_volume(void)
+{
+  tm_mesh *a = boxes(&two, &two, &two, NULL), *b = boxes(&beside, &two, &two, NULL);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  int      shared = 0;
+
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 0);
+  if (RT_EQ(s.status, REMAP_OK)) {
+    RT_EQ(s.cells->num_cells, 16);
+    RT_EQ(s.cells->num_faces, 2 * a->view.num_faces - 4);
+    for (rm_lid f = 0; f < s.cells->num_faces; f++) {
+      const rm_lid *c = s.cells->face_cell[f];
+      shared += c[1] >= 0 && s.cells->cell_ancestor[c[0]][0] >= 0 && s.cells->cell_ancestor[c[1]][0] < 0;
+    }
+    RT_EQ(shared, 4);
+  }
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+}
+
+/* Eight children of one parent, whose outer faces are those of the children. */
+static void nested_operands_are_the_finer_one(void)
+{
+  tm_mesh *a = boxes(&one, &one, &one, NULL), *b = boxes(&two, &two, &two, NULL);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+
+  if (RT_EQ(s.status, REMAP_OK)) {
+    RT_EQ(s.cells->num_cells, b->view.num_cells);
+    RT_EQ(s.cells->num_faces, b->view.num_faces);
+    RT_EQ(s.cells->num_vertices, b->view.num_nodes);
+  }
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+}
+
+/* A slab through a box leaves two parts of it. */
+static void components_of_a_pair_are_cells_of_their_own(void)
+{
+  static const spacing low = {1, {0, 90}}, slab = {1, {60, 80}}, across = {1, {-10, 100}};
+  tm_mesh *a = boxes(&low, &one, &low, NULL), *b = boxes(&across, &slab, &across, NULL);
+
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 2);
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 1);
+  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 1);
+  tm_free(a);
+  tm_free(b);
+}
+
+static void cells_that_overlap_are_refused(void)
+{
+  tm_mesh *a = tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -0.25, NULL, NULL), *b = boxes(&one, &one, &one, NULL);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+
+  RT_EQ(s.status, REMAP_BAD_MESH);
+  RT_CHECK(s.l->reason.text[0] != 0);
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+}
+
 RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents), RT_CASE(a_box_around_all),
         RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut), RT_CASE(boxes_that_abut_askew),
         RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
         RT_CASE(a_layer_without_thickness), RT_CASE(two_layers_without_thickness), RT_CASE(a_box_within_a_box),
         RT_CASE(a_box_through_a_face), RT_CASE(a_box_on_a_face_from_inside), RT_CASE(a_box_on_a_face_from_outside),
-        RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed))
+        RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(operations_add_up),
+        RT_CASE(identical_operands_are_their_union_and_leave_no_difference), RT_CASE(operands_with_one_skin_leave_no_difference),
+        RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
+        RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(cells_that_overlap_are_refused))

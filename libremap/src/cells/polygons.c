@@ -28,6 +28,7 @@ typedef struct arc {
 typedef struct cycle {
   rm_lid half, num, state, component, inside; /* inside: the cycle whose hole it is, -1 */
   double area;
+  bool   simple; /* it has no vertex twice */
 } cycle;
 
 typedef struct edge_spot {
@@ -276,6 +277,86 @@ static int by_ends(const void *a, const void *b)
   return (x->left > y->left) - (x->left < y->left);
 }
 
+/* ---- around an edge of the other mesh ------------------------------------------------------------------------------------- */
+
+/* A corner of the triangle on the left of the line from a to b in its plane. */
+static const double *corner_left_of(const work *w, const double a[3], const double b[3])
+{
+  const rm_trimesh *m = w->l->o->mesh[w->side];
+  const rm_lid     *v = m->triangle[w->t];
+  double            o[3];
+
+  rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
+  for (int h = 0; h < 3; h++)
+    if (rm_orient3d(a, b, m->vertex[v[h]], o) > 0) return m->vertex[v[h]];
+  return NULL;
+}
+
+/* True if x and y, in one plane with the line f0 f1, are on the same side of it. */
+static bool same_side(const double f0[3], const double f1[3], const double x[3], const double y[3])
+{
+  double o[3];
+  return rm_off_plane(f0, f1, x, o) && rm_orient3d(o, f0, f1, x) == rm_orient3d(o, f0, f1, y);
+}
+
+/* The half-plane from f to x among the triangles of the other mesh around edge f: the triangle it lies in, or the cell. */
+static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *triangle, rm_lid *cell)
+{
+  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]], *nearest = NULL;
+  int               nearest_quarter = 0;
+
+  *triangle = -1;
+  for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
+    const rm_lid  b = m->star[z] / 4;
+    const int     h = m->star[z] & 3;
+    const double *y = m->vertex[m->triangle[b][h == 0 ? 2 : h == 1 ? 0 : 1]];
+    int           quarter;
+
+    if (!rm_is_present(w->l, other_side(w), b)) continue;
+    const int s = rm_orient3d(f0, f1, x, y);
+    if (s == 0 && same_side(f0, f1, x, y)) {
+      *triangle = b;
+      return true;
+    }
+    quarter = s > 0 ? 0 : s == 0 ? 1 : 2;
+    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0))) continue;
+    nearest         = y;
+    nearest_quarter = quarter;
+    *cell           = w->l->cell[other_side(w)][b][h == 2 ? 1 : 0]; /* the side that is met first, turning about f */
+  }
+  return nearest != NULL;
+}
+
+/* What lies left of the arc from p to q, which runs along edge f of the other mesh: the triangle on which the polygon there lies, or
+ * the cell. False if there is nothing around f. */
+static bool place_left(const work *w, rm_lid p, rm_lid q, rm_lid f, rm_lid *triangle, rm_lid *cell)
+{
+  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]];
+  int               sign = 0;
+
+  for (int k = 0; k < 3 && !sign; k++) /* the direction of the arc along f */
+    if (f0[k] != f1[k]) sign = rm_compare(w->l, q, p, k) * (f1[k] > f0[k] ? 1 : -1);
+  const double *x = sign > 0 ? corner_left_of(w, f0, f1) : corner_left_of(w, f1, f0);
+  return x && place_around(w, f, x, triangle, cell);
+}
+
+/* An arc along an edge of the other mesh: the cells beside it. Separates is false where the other mesh only touches the triangle
+ * there, with one cell on both sides. */
+static remap_status place_arc(work *w, arc *a, bool *separates)
+{
+  rm_lid triangle[2] = {-1, -1}, cell[2] = {RM_UNKNOWN, RM_UNKNOWN}, ignored, f;
+
+  if (!carrier(w, other_side(w), a->from, a->to, &ignored, &f) || f < 0) return tangled(w);
+  if (!place_left(w, a->from, a->to, f, &triangle[0], &cell[0]) || !place_left(w, a->to, a->from, f, &triangle[1], &cell[1]))
+    return tangled(w);
+  if (triangle[0] < 0) a->left = cell[0];
+  if (triangle[1] < 0) a->right = cell[1];
+  *separates = triangle[0] >= 0 || triangle[1] >= 0 || cell[0] != cell[1];
+  return REMAP_OK;
+}
+
 /* Arcs that several triangles of the other mesh make are one. */
 static remap_status inner_arcs(work *w)
 {
@@ -284,9 +365,11 @@ static remap_status inner_arcs(work *w)
   RM_TRY(edges_in_plane(w));
   if (w->num_arcs > 1) qsort(w->arc, (size_t)w->num_arcs, sizeof *w->arc, by_ends);
   for (rm_lid k = 0; k < w->num_arcs; k++) {
-    const arc *a = &w->arc[k];
+    arc *a         = &w->arc[k];
+    bool separates = true;
     if (k && a->from == a[-1].from && a->to == a[-1].to) continue;
-    RM_TRY(add_arc(w, a->from, a->to, a->left, a->right));
+    if (a->left == RM_UNKNOWN) RM_TRY(place_arc(w, a, &separates));
+    if (separates) RM_TRY(add_arc(w, a->from, a->to, a->left, a->right));
   }
   return REMAP_OK;
 }
@@ -375,15 +458,22 @@ static double cycle_area(const work *w, rm_lid first)
 
 static remap_status walk_cycles(work *w)
 {
+  rm_lid *seen;
+
+  RM_TRY(rm_grow(&w->component, &w->component_room, w->num_nodes, sizeof *w->component));
+  seen = w->component;
+  for (rm_lid k = 0; k < w->num_nodes; k++) seen[k] = -1;
   w->num_cycles = 0;
   for (rm_lid first = 0; first < w->num_halves; first++) {
-    cycle  c = {first, 0, RM_UNKNOWN, 0, -1, 0};
+    cycle  c = {first, 0, RM_UNKNOWN, 0, -1, 0, true};
     rm_lid h = first;
 
     if (w->half[first].cycle != NOT_CALLED) continue;
     do {
       if (w->half[h].cycle != NOT_CALLED) return tangled(w);
       w->half[h].cycle = w->num_cycles;
+      c.simple         = c.simple && seen[w->half[h].from] != w->num_cycles;
+      seen[w->half[h].from] = w->num_cycles;
       c.num++;
       if (w->half[h].state != RM_UNKNOWN) {
         if (c.state != RM_UNKNOWN && c.state != w->half[h].state) return tangled(w);
@@ -430,7 +520,6 @@ static remap_status find_holes(work *w, bool *any)
   rm_lid *parent;
 
   *any = false;
-  RM_TRY(rm_grow(&w->component, &w->component_room, w->num_nodes, sizeof *w->component));
   parent = w->component;
   for (rm_lid k = 0; k < w->num_nodes; k++) parent[k] = k;
   for (rm_lid h = 0; h < w->num_halves; h += 2) {
@@ -468,55 +557,6 @@ static remap_status find_holes(work *w, bool *any)
 
 /* ---- where a polygon lies in the other mesh -------------------------------------------------------------------------------------- */
 
-/* A corner of the triangle on the left of the line from a to b in its plane. */
-static const double *corner_left_of(const work *w, const double a[3], const double b[3])
-{
-  const rm_trimesh *m = w->l->o->mesh[w->side];
-  const rm_lid     *v = m->triangle[w->t];
-  double            o[3];
-
-  rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
-  for (int h = 0; h < 3; h++)
-    if (rm_orient3d(a, b, m->vertex[v[h]], o) > 0) return m->vertex[v[h]];
-  return NULL;
-}
-
-/* True if x and y, in one plane with the line f0 f1, are on the same side of it. */
-static bool same_side(const double f0[3], const double f1[3], const double x[3], const double y[3])
-{
-  double o[3];
-  return rm_off_plane(f0, f1, x, o) && rm_orient3d(o, f0, f1, x) == rm_orient3d(o, f0, f1, y);
-}
-
-/* The half-plane from f to x among the triangles of the other mesh around edge f: the triangle it lies in, or the cell. */
-static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *triangle, rm_lid *cell)
-{
-  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
-  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]], *nearest = NULL;
-  int               nearest_quarter = 0;
-
-  *triangle = -1;
-  for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
-    const rm_lid  b = m->star[z] / 4;
-    const int     h = m->star[z] & 3;
-    const double *y = m->vertex[m->triangle[b][h == 0 ? 2 : h == 1 ? 0 : 1]];
-    int           quarter;
-
-    if (!rm_is_present(w->l, other_side(w), b)) continue;
-    const int s = rm_orient3d(f0, f1, x, y);
-    if (s == 0 && same_side(f0, f1, x, y)) {
-      *triangle = b;
-      return true;
-    }
-    quarter = s > 0 ? 0 : s == 0 ? 1 : 2;
-    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0))) continue;
-    nearest         = y;
-    nearest_quarter = quarter;
-    *cell           = w->l->cell[other_side(w)][b][h == 2 ? 1 : 0]; /* the side that is met first, turning about f */
-  }
-  return nearest != NULL;
-}
-
 /* Of a polygon that has no arc with a state: all its arcs lie on triangles of the other mesh. */
 static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *state)
 {
@@ -526,15 +566,7 @@ static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *st
 
   *triangle = -1;
   if (!carrier(w, other_side(w), p, q, &b, &f)) return tangled(w);
-  if (f >= 0) {
-    const double *f0 = other->vertex[other->edge[f][0]], *f1 = other->vertex[other->edge[f][1]];
-    int           k = 0, sign = 0;
-    for (; k < 3 && !sign; k++) /* the direction of the arc along f */
-      if (f0[k] != f1[k]) sign = rm_compare(w->l, q, p, k) * (f1[k] > f0[k] ? 1 : -1);
-    const double *x = sign > 0 ? corner_left_of(w, f0, f1) : corner_left_of(w, f1, f0);
-    if (!x || !place_around(w, f, x, triangle, state)) return tangled(w);
-    return REMAP_OK;
-  }
+  if (f >= 0) return place_left(w, p, q, f, triangle, state) ? REMAP_OK : tangled(w);
   /* the arc runs through the inside of b: along an edge of this triangle, whose far corner is off that edge */
   for (int h = 0; h < 3; h++) {
     const rm_lid e = own->triangle_edge[w->t][h];
@@ -598,7 +630,8 @@ static remap_status push_loop(work *w, const cycle *c, rm_polygons *to)
   return REMAP_OK;
 }
 
-static remap_status push_with_holes(work *w, rm_lid around, rm_lid b, rm_lid state)
+/* A polygon with holes, or which meets itself in a vertex, as triangles. */
+static remap_status push_cut(work *w, rm_lid around, rm_lid b, rm_lid state)
 {
   rm_polygons  loops = {0};
   int64_t     *offset = rm_arena_alloc(w->scratch, (int64_t)w->num_cycles + 1, sizeof *offset), num = 0;
@@ -640,15 +673,15 @@ static remap_status one_triangle(work *w)
   for (rm_lid k = 0; k < w->num_cycles && status == REMAP_OK; k++) {
     const cycle *c = &w->cycle[k];
     rm_lid       b = -1, state = c->state;
-    bool         has_hole = false;
+    bool         cut = !c->simple;
 
     if (c->inside >= 0) continue;
     if (c->num < 3) return tangled(w);
     if (state == RM_UNKNOWN) RM_TRY(locate(w, c, &b, &state));
     if (b >= 0 && w->side == 1) continue;
-    for (rm_lid h = 0; h < w->num_cycles && holes; h++) has_hole = has_hole || w->cycle[h].inside == k;
-    if (has_hole) {
-      status = push_with_holes(w, k, b, state);
+    for (rm_lid h = 0; h < w->num_cycles && holes; h++) cut = cut || w->cycle[h].inside == k;
+    if (cut) {
+      status = push_cut(w, k, b, state);
       continue;
     }
     const int64_t first = w->out->num_vertices;

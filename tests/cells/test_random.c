@@ -1,0 +1,89 @@
+/* Supermeshes of random meshes whose coordinates have so few bits that vertices, edges and faces of the two coincide, cross and
+ * touch in every way. What fails prints its seed. */
+#include "super.h"
+
+/* A mesh of a random kind, place and roughness. */
+typedef struct recipe {
+  uint64_t seed;
+  int      steps; /* coordinates are multiples of 1 / steps   */
+  int      rough; /* nodes move by up to so many of them      */
+  double   scale[3], shift[3];
+} recipe;
+
+static void rough_node(double xyz[3], const void *data)
+{
+  const recipe *r = data;
+  uint64_t      h = r->seed ^ rm_hash_point(xyz);
+
+  for (int c = 0; c < 3; c++) {
+    const double move = r->rough ? (double)(tm_random(&h, 2 * r->rough + 1) - r->rough) : 0;
+    xyz[c]            = (rint((xyz[c] * r->scale[c] + r->shift[c]) * r->steps) + move) / r->steps;
+  }
+}
+
+/* Every cell is seen from the mean of its vertices, clearly: neither tangled nor inverted. */
+static bool is_plain(const rm_trimesh *m)
+{
+  for (rm_lid c = 0; c < m->num_cells; c++) {
+    const rm_lid first = m->cell_vertex_offset[c], last = m->cell_vertex_offset[c + 1];
+    double       o[3]  = {0, 0, 0};
+
+    for (rm_lid k = first; k < last; k++)
+      for (int d = 0; d < 3; d++) o[d] += m->vertex[m->cell_vertex[k]][d] / (last - first);
+    for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++) {
+      const rm_lid *t = m->triangle[m->cell_triangle[a] / 2];
+      if (rm_det_dd(o, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]).hi * (m->cell_triangle[a] & 1 ? -1 : 1) < 1e-9) return false;
+    }
+  }
+  return true;
+}
+
+static tm_mesh *random_mesh(uint64_t *seed, bool rough)
+{
+  const int kind = (int)tm_random(seed, 7), most = kind < 2 ? 3 : 2;
+  const int n[3] = {1 + (int)tm_random(seed, most), 1 + (int)tm_random(seed, most), 1 + (int)tm_random(seed, most)};
+  recipe    r    = {*seed, 16 << tm_random(seed, 3), 0, {0, 0, 0}, {0, 0, 0}};
+
+  for (int c = 0; c < 3; c++) {
+    r.scale[c] = .5 + .25 * (double)tm_random(seed, 3);
+    r.shift[c] = .125 * (double)tm_random(seed, 5) - .25;
+  }
+  r.rough = rough ? (int)tm_random(seed, 2) * (r.steps / 16) : 0;
+  switch (kind) {
+    case 2: return tm_tetrahedra(n, rough_node, &r);
+    case 3: return tm_prisms(n, rough_node, &r);
+    case 4: return tm_pyramids(n, rough_node, &r);
+    case 5: return tm_refined((int[]){2, 1, 1}, tm_right_half, rough_node, &r);
+    case 6: return tm_dual((int[]){1, 1, 1}, rough_node, &r);
+    default: return tm_hexahedra(n, rough_node, &r);
+  }
+}
+
+static bool try_seed(uint64_t number, bool rough)
+{
+  uint64_t          seed   = 1000 * number;
+  const int         before = rt_failed_;
+  tm_mesh          *a = random_mesh(&seed, rough), *b = random_mesh(&seed, rough);
+  const remap_faces faces = tm_random(&seed, 2) ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL;
+  super             s     = super_of(a, b, faces, NULL, RM_CELLS_UNION);
+  const bool        plain = s.l->mesh[0] && s.l->mesh[1] && is_plain(s.l->mesh[0]) && is_plain(s.l->mesh[1]);
+
+  if (plain) super_check(&s, -1, faces == REMAP_FACES_DIAGONAL); /* centres do not have few bits */
+  if (rt_failed_ > before) printf("# seed %llu, %d and %d cells, faces %d\n", (unsigned long long)number, s.l->num[0], s.l->num[1], faces);
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+  return plain;
+}
+
+static void seeds(int count, bool rough)
+{
+  int done = 0;
+
+  for (uint64_t number = 1; done < (rt_long() ? 50 * count : count) && rt_failed_ < 40; number++) done += try_seed(number, rough);
+}
+
+static void straight_meshes_on_one_lattice_have_a_supermesh(void) { seeds(400, false); }
+static void rough_meshes_of_few_bits_have_a_supermesh(void) { seeds(400, true); }
+
+RT_MAIN(RT_CASE(straight_meshes_on_one_lattice_have_a_supermesh), RT_CASE(rough_meshes_of_few_bits_have_a_supermesh))
