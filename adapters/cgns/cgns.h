@@ -178,6 +178,10 @@ rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values
  *  file, or a place that cannot be written. Nothing is changed. Collective. Errors: USAGE, IO. */
 rcgns_status rcgns_check_output(const rcgns_file *file, const char *path, rcgns_message *message);
 
+/** Refuse a solution name that rcgns_write would refuse for this target: no name for a node, or the name of a node that cannot take
+ *  CellCenter fields. Nothing is changed. Collective. Errors: USAGE. */
+rcgns_status rcgns_check_solution(rcgns_file *file, const char *solution, rcgns_message *message);
+
 /** Write `path`: everything that `file` (the target) holds, unknown nodes included, as HDF5 with the target's version, plus
  *  the fields as R8 in the CellCenter FlowSolution_t named `solution` of every zone that was read. Where the target has that
  *  node, fields of the same name are replaced and the others stay; its Rind is taken away. Links to other files become

@@ -364,6 +364,13 @@ rcgns_status rcgns_check_output(const rcgns_file *file, const char *path, rcgns_
   return rc_agree(file->comm, file->rank == 0 ? check_path(file, path, message) : RCGNS_OK, message);
 }
 
+rcgns_status rcgns_check_solution(rcgns_file *file, const char *solution, rcgns_message *message)
+{
+  const change c = {.file = file, .solution = solution, .message = message};
+
+  return rc_agree(file->comm, check_names(&c), message);
+}
+
 /* A new, empty file beside path; its name goes to out. */
 static rcgns_status make_beside(const char *path, char *out, size_t size, rcgns_message *message)
 {

@@ -20,6 +20,7 @@ static cli_exit select_solutions(cli_job *j, cli_failure *why)
                         why));
   j->report.solution[REMAP_SOURCE] = j->solution[REMAP_SOURCE].name;
   j->report.solution[REMAP_TARGET] = options->output_solution ? options->output_solution : j->solution[REMAP_SOURCE].name;
+  CLI_TRY(cli_from_cgns(rcgns_check_solution(j->file[REMAP_TARGET], j->report.solution[REMAP_TARGET], &message), &message, why));
   rcgns_choice_default(&choice);
   choice.name     = j->report.solution[REMAP_TARGET];
   choice.optional = 1;

@@ -26,5 +26,7 @@ refused 5 "short_field.cgns.*Zone.*Density" "a field of the wrong size is refuse
 refused 5 "nan_field.cgns.*Zone.*cell 3.*MomentumX" "a value that is NaN is refused" nan_field.cgns mesh.cgns -o out/result.cgns
 refused 5 "at_vertices.cgns.*Vertex.*Density" "fields at vertices are refused by name" \
   at_vertices.cgns mesh.cgns -o out/result.cgns
+refused 2 "at_vertices.cgns.*Zone.*Vertex" "a target with vertex values in the output's solution is refused" \
+  good.cgns at_vertices.cgns -o out/result.cgns
 refused 5 mesh.cgns "a source without fields is refused" mesh.cgns good.cgns -o out/result.cgns
 finish
