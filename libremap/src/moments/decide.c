@@ -115,7 +115,7 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
 {
   slot         *s = &w->slots[w->slot_of[j]];
   const double *n = pl->n;
-  const point  *start = sign > 0 ? p : q; /* going round the polygon: every corner is the start of a side */
+  const point  *start = sign > 0 ? p : q, *end = sign > 0 ? q : p; /* going round the polygon */
   double        a[3], b[3];
   polygon      *g = NULL;
   corner       *c;
@@ -139,11 +139,13 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
     b[d] -= g->first[d];
     g->reach = fmax(g->reach, fmax(fabs(a[d]), fabs(b[d])));
   }
-  if ((w->status = rm_grow(&w->corner, &w->corner_room, w->num_corners + 1, sizeof *w->corner)) != REMAP_OK) return;
-  c  = &w->corner[w->num_corners];
-  *c = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->base};
+  if ((w->status = rm_grow(&w->corner, &w->corner_room, w->num_corners + 2, sizeof *w->corner)) != REMAP_OK) return;
+  c    = &w->corner[w->num_corners];
+  c[0] = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->base};
+  c[1] = (corner){-1, end->mesh, end->edge, end->triangle, end->base};
   if (start->edge >= 0) c->vertex = limit_vertex(w->o, c);
-  g->first_corner = w->num_corners++;
+  g->first_corner = w->num_corners;
+  w->num_corners += 2;
   g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
   g->num_cones++;
 }
@@ -155,17 +157,23 @@ void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, doub
     if (j[h] >= 0) add_polygon_side(w, j[h], h ? -sign : sign, pl, p, q);
 }
 
+/* The axis along which the polygon's triangle is largest. */
+static int longest_axis(const work *w, const polygon *g)
+{
+  const double *n = w->o->mesh[g->mesh]->normal[g->triangle];
+  const int     k = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
+  return fabs(n[2]) > fabs(n[k]) ? 2 : k;
+}
+
 /* All corners of a polygon have their limits on one line. Exact. */
 static bool is_line(const work *w, const polygon *g)
 {
-  const rm_trimesh *m = w->o->mesh[g->mesh];
-  const double     *n = m->normal[g->triangle], *one = NULL, *other = NULL;
-  int               k = fabs(n[1]) > fabs(n[0]) ? 1 : 0, scale;
-  bool              simple = true;
-  rm_int            first[3], at[3], line[3], d;
-  bool              has_first = false, has_line = false;
+  const double *one = NULL, *other = NULL;
+  const int     k = longest_axis(w, g), scale = RM_INT_SCALE;
+  bool          simple = true;
+  rm_int        first[3], at[3], line[3], d;
+  bool          has_first = false, has_line = false;
 
-  if (fabs(n[2]) > fabs(n[k])) k = 2;
   for (int c = g->first_corner; c >= 0 && simple; c = w->corner[c].next) { /* mostly the same vertex or two, again and again */
     const double *v = w->corner[c].vertex;
     if (!one) one = v;
@@ -173,7 +181,6 @@ static bool is_line(const work *w, const polygon *g)
     simple = v && (is_same(v, one) || (other && is_same(v, other)));
   }
   if (simple) return true;
-  scale = RM_INT_SCALE;
   for (int c = g->first_corner; c >= 0; c = w->corner[c].next) {
     homogeneous(w->o, &w->corner[c], w->corner[c].vertex, k, scale, has_first ? at : first);
     if (!has_first) {
@@ -185,6 +192,61 @@ static bool is_line(const work *w, const polygon *g)
       rm_int_dot(&d, line, at);
       if (rm_int_sign(&d)) return false;
     }
+  }
+  return true;
+}
+
+/* Both ends of the side that begins with corner c, going round. */
+static void side_ends(const work *w, int c, int k, rm_int start[3], rm_int end[3])
+{
+  const corner *to = &w->corner[c + 1];
+
+  homogeneous(w->o, &w->corner[c], w->corner[c].vertex, k, RM_INT_SCALE, start);
+  homogeneous(w->o, to, to->edge < 0 ? to->vertex : limit_vertex(w->o, to), k, RM_INT_SCALE, end);
+}
+
+static bool is_same_place(const rm_int a[3], const rm_int b[3])
+{
+  rm_int x, y;
+
+  for (int h = 0; h < 2; h++) {
+    rm_int_mul(&x, &a[h], &b[2]);
+    rm_int_mul(&y, &b[h], &a[2]);
+    rm_int_sub(&x, &x, &y);
+    if (rm_int_sign(&x)) return false;
+  }
+  return true;
+}
+
+static bool is_on(const rm_int line[3], const rm_int at[3])
+{
+  rm_int d;
+
+  rm_int_dot(&d, line, at);
+  return rm_int_sign(&d) == 0;
+}
+
+/* The polygon's limit has no area: on every line, as many of the sides that lie there start as end at any place, for only then do
+ * they run to and fro. O(sides squared), exact. */
+static bool is_without_area(const work *w, const polygon *g)
+{
+  const int k = longest_axis(w, g);
+  rm_int    from[3], to[3], line[3], start[3], end[3];
+
+  if (is_line(w, g)) return true;
+  for (int c = g->first_corner; c >= 0; c = w->corner[c].next) {
+    int balance[2] = {0, 0};
+
+    side_ends(w, c, k, from, to);
+    if (is_same_place(from, to)) continue;
+    rm_int_cross(line, from, to);
+    for (int d = g->first_corner; d >= 0; d = w->corner[d].next) {
+      side_ends(w, d, k, start, end);
+      if (!is_on(line, start) || !is_on(line, end)) continue;
+      balance[0] += is_same_place(start, from) - is_same_place(end, from);
+      balance[1] += is_same_place(start, to) - is_same_place(end, to);
+    }
+    if (balance[0] || balance[1]) return false;
   }
   return true;
 }
@@ -206,7 +268,7 @@ bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s)
       cancels = l != k && coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle) &&
                 facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0;
     }
-    if (!cancels && (has_area(w, i, s, g) || !is_line(w, g))) return true;
+    if (!cancels && (has_area(w, i, s, g) || !is_without_area(w, g))) return true;
   }
   return false;
 }
@@ -267,7 +329,7 @@ bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bo
     const polygon *g = &w->polygon[l];
     const rm_lid   t = g->triangle;
 
-    if (g->mesh != mesh || !own->triangle_is_skin[t] || (!has_area(w, i, s, g) && is_line(w, g))) continue;
+    if (g->mesh != mesh || !own->triangle_is_skin[t] || (!has_area(w, i, s, g) && is_without_area(w, g))) continue;
     const double *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     const double *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
     int           k    = fabs(n[1]) > fabs(n[0]) ? 1 : 0;

@@ -362,10 +362,9 @@ static uint8_t skins_in(const work *w, rm_lid i, const slot *s, bool is_flat)
   return flags;
 }
 
-/* A pair without volume is none; but where one cell is flat and in the skin, the other may end there. */
+/* A pair without volume is none; but where one cell is flat, wholly or in part, and in the skin, the other may end there. */
 static remap_status drop_pair(work *w, rm_lid i, slot *s)
 {
-  if (w->part->piece[0].cell_volume[i] != 0 && w->part->piece[1].cell_volume[s->target] != 0) return REMAP_OK;
   const uint8_t flags = skins_in(w, i, s, true);
 
   if (!flags) return REMAP_OK;

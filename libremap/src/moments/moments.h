@@ -8,7 +8,7 @@
 enum {
   RM_PAIR_SOURCE_SKIN = 1, /* the source mesh's skin passes through the target cell within this pair: that cell is partial */
   RM_PAIR_TARGET_SKIN = 2, /* the target mesh's skin passes through the source cell: that one is partial                   */
-  RM_PAIR_EMPTY       = 4  /* no pair: one cell has no volume, but its skin passes through the other; volume is 0          */
+  RM_PAIR_EMPTY       = 4  /* no pair: no volume, but the skin of a flat part of one cell passes through the other; V is 0  */
 };
 
 /* Pairs of this rank's pieces. Read-only once built. Invariants: a pair is listed once, in the order of sources and in no

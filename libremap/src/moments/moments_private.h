@@ -66,9 +66,9 @@ typedef struct polygon {
   double  reach;    /* largest distance of the others from it, by any one coordinate */
 } polygon;
 
-/* A vertex of a polygon, for the decision whether it has area. */
+/* A vertex of a polygon, for the decision whether it has area: the start of a side, followed by the side's end. */
 typedef struct corner {
-  int           next;     /* of the same polygon, -1 */
+  int           next;     /* start of another side of the same polygon, -1 */
   int           mesh;     /* as in point             */
   rm_lid        edge, triangle;
   const double *vertex;   /* its coordinates if it is a vertex, else NULL */
@@ -132,8 +132,8 @@ double rm_moments_noise(const work *w, rm_lid i, const slot *s);
 /* True if the exact volume of the pair, whose sum is within its noise, is not zero (DESIGN 2.6). Needs its polygons. */
 bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s);
 
-/* True if the skin of a mesh passes through the pair's cell of the other mesh. is_flat: one of the two has no volume, and a skin that
- * lies in the other's face, to whichever side, does not pass through it. Needs its polygons. */
+/* True if the skin of a mesh passes through the pair's cell of the other mesh. is_flat: the pair has no volume, and a skin that lies in the
+ * other cell's face, to whichever side, does not pass through it. Needs its polygons. */
 bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bool is_flat);
 
 #endif
