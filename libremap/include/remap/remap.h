@@ -4,6 +4,7 @@
  *   remap_create      take a communicator, get a context             (collective)
  *   remap_set_mesh    lend the source mesh, then the target mesh     (not collective)
  *   remap_build       overlay the two meshes                         (collective)
+ *   remap_move        overlay them again in a new position           (collective)
  *   remap_set_masks   say which cells give and which want values     (collective)
  *   remap_field       move cell fields across, either way            (collective)
  *   remap_destroy     give everything back                           (collective)
@@ -140,7 +141,7 @@ typedef struct remap_options {
 } remap_options;
 
 /** One rank's part of a mesh; the parts of all ranks are disjoint sets of cells. Borrowed: it and everything it points to
- *  are read during remap_build only and never freed.
+ *  are read during remap_build (and remap_move) only and never freed.
  *
  *  A face is a loop of nodes, its normal (by the right-hand rule) pointing out of face_owner. A face between cells of two
  *  ranks, or of two zones, is given once by each, with neighbour -1: faces join by the coordinates of their nodes. Nodes
@@ -191,6 +192,13 @@ typedef struct remap_field_desc {
   double *const       *out_block; /**< [blocks of the receiving mesh] likewise                            */
 } remap_field_desc;
 
+/** Where the nodes of a mesh go; with both members NULL they stay where they are. */
+typedef struct remap_motion {
+  const double *const *node_xyz; /**< [blocks][num_nodes][3] new coordinates, lent from now on; NULL: those lent last  */
+  const double        *matrix;   /**< [3][4] then, of what is lent, x' = m[0] x + m[1] y + m[2] z + m[3] and so on, added in
+                                      this order; NULL: as lent */
+} remap_motion;
+
 /** Which cells of this rank take part in transfers, by side; [cells, block after block] each, 0 is no; NULL: all do. */
 typedef struct remap_masks {
   const uint8_t *gives[2]; /**< [side] has values that others may use: 0 in holes and fringes               */
@@ -228,7 +236,7 @@ typedef struct remap_stats {
 } remap_stats;
 
 /** Pairs of one direction as rows of a sparse matrix, one row per receiving cell of this rank. A view: owned by the
- *  context, valid until the next remap_build, remap_set_masks or remap_destroy. Within a row the order is canonical: it depends on
+ *  context, valid until the next remap_build, remap_move, remap_set_masks or remap_destroy. Within a row the order is canonical: it depends on
  *  coordinates only. */
 typedef struct remap_pairs_view {
   int64_t        num_rows;   /**< receiving cells on this rank */
@@ -272,7 +280,14 @@ REMAP_API remap_status remap_set_blocks(remap_context *ctx, remap_side side, int
  *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
 REMAP_API remap_status remap_build(remap_context *ctx);
 
-/** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build or call, and are
+/** Overlay the meshes in a new position. Collective, after remap_build; motion is [side]. The result is the same, bit by bit, as
+ *  that of a remap_build with the moved coordinates; a mesh that stays is not read again. Whoever calls this keeps what
+ *  remap_set_mesh and the last motion lent, unchanged, until the next remap_build or remap_destroy. A matrix is applied to the
+ *  lent coordinates each time anew, so that motions do not add up. Masks end. If it fails, remap_build comes next.
+ *  Errors: those of remap_build; BAD_ORDER (no overlay, a mesh set since, or a transfer under way), BAD_ARGUMENT. */
+REMAP_API remap_status remap_move(remap_context *ctx, const remap_motion motion[2]);
+
+/** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build, remap_move or call, and are
  *  copied. A pair of cells counts if the one gives and the other wants: coverage, pairs, integrals and reconstruction know no others,
  *  so what a masked cell holds is never read, not even as a neighbour, and a cell that does not want is never written. NULL: no
  *  masks. remap_stats stays as it is. Errors: BAD_ORDER (no overlay, or a transfer under way), NO_MEMORY, MPI_FAILURE. */
@@ -291,7 +306,7 @@ REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction
 /** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them and
  *  sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes. fields and
  *  transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change. One transfer in
- *  each direction and context may be under way; all ranks start and finish them in the same order, and none builds or masks in
+ *  each direction and context may be under way; all ranks start and finish them in the same order, and none builds, moves or masks in
  *  between.
  *  A start that fails does so on all ranks alike and leaves nothing under way; what is wrong with this rank's own values is
  *  told by the finish. Errors: those of remap_field; BAD_ORDER also where the other half is missing. */

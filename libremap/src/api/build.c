@@ -6,76 +6,12 @@
 #include <string.h>
 #include "moments/zone_overlap.h"
 
-/* ---- names -------------------------------------------------------------------------------------------------------- */
-
-static const char *copy_text(rm_arena *arena, const char *text)
-{
-  const size_t n    = strlen(text) + 1;
-  char        *copy = rm_arena_alloc(arena, (int64_t)n, 1);
-  return copy ? memcpy(copy, text, n) : NULL;
-}
-
-static remap_status copy_labels(rm_arena *arena, int side, const remap_mesh *given, rm_labels *out, rm_reason *reason)
-{
-  const char **zone;
-  int64_t     *offset;
-
-  *out = (rm_labels){.mesh = copy_text(arena, given->name ? given->name : side == REMAP_SOURCE ? "source mesh" : "target mesh")};
-  if (!out->mesh) return REMAP_NO_MEMORY;
-  if (given->num_zones == 0) return REMAP_OK;
-  if (given->num_zones < 0 || !given->zone_name || !given->zone_cell_offset)
-    return rm_fail(REMAP_BAD_MESH, reason, side, -1, "num_zones is %lld but zone_name or zone_cell_offset is missing",
-                   (long long)given->num_zones);
-  RM_NEW(zone, arena, given->num_zones);
-  RM_NEW(offset, arena, given->num_zones + 1);
-  for (int64_t z = 0; z <= given->num_zones; z++) {
-    offset[z] = given->zone_cell_offset[z];
-    if (z > 0 && offset[z] < offset[z - 1])
-      return rm_fail(REMAP_BAD_MESH, reason, side, -1, "zone_cell_offset descends at zone %lld", (long long)z);
-  }
-  for (int64_t z = 0; z < given->num_zones; z++) {
-    zone[z] = copy_text(arena, given->zone_name[z] ? given->zone_name[z] : "unnamed");
-    if (!zone[z]) return REMAP_NO_MEMORY;
-  }
-  out->zone_cell_offset = offset;
-  out->zone             = zone;
-  out->num_zones        = given->num_zones;
-  return REMAP_OK;
-}
-
 /* ---- stages ------------------------------------------------------------------------------------------------------- */
 
 /* Every stage's end: one status for all, and the first failing rank's reason. */
 static remap_status stage(remap_context *ctx, remap_status mine, rm_reason *reason)
 {
   return rm_comm_agree_reason(&ctx->comm, mine, reason);
-}
-
-static remap_status report_progress(remap_context *ctx, const char *phase, double done)
-{
-  return ctx->options.progress && ctx->options.progress(ctx->options.user, phase, done) ? REMAP_CANCELLED : REMAP_OK;
-}
-
-static remap_status read_meshes(remap_context *ctx, rm_arena *passing, rm_reason *reason)
-{
-  remap_mesh   given[2];
-  remap_status status = REMAP_OK;
-
-  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
-    if (!ctx->is_set[side])
-      status = rm_fail(REMAP_BAD_ORDER, reason, side, -1, "remap_set_mesh was not called for this mesh");
-    else
-      status = rm_context_join_blocks(ctx->arena, passing, side, ctx->num_blocks[side], ctx->block[side], &given[side],
-                                      &ctx->layout[side], reason);
-    if (status == REMAP_OK) status = copy_labels(ctx->arena, side, &given[side], &ctx->labels[side], reason);
-  }
-  RM_TRY(stage(ctx, status, reason));
-  RM_TRY(rm_frame_build(&ctx->comm, given, &ctx->frame, reason));
-  for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_mesh_build(ctx->arena, &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side], reason));
-    RM_TRY(stage(ctx, report_progress(ctx, "reading of meshes", 0.5 * (side + 1)), reason));
-  }
-  return REMAP_OK;
 }
 
 /* The largest coordinate of each mesh over all ranks. */
@@ -102,10 +38,10 @@ static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_p
     RM_TRY(rm_zone_overlap_find(&ctx->frame, &part->piece[side], mesh[side], ctx->options.faces, ctx->labels[side].num_zones,
                                 ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side], reason));
   }
-  RM_TRY(report_progress(ctx, "triangulation", 1));
+  RM_TRY(rm_context_progress(ctx, "triangulation", 1));
   RM_TRY(rm_overlay_build(arena, mesh, part, &progress, overlay, reason));
   RM_TRY(rm_moments_build(arena, part, *overlay, 1, moments));
-  return report_progress(ctx, "volumes and moments", 1);
+  return rm_context_progress(ctx, "volumes and moments", 1);
 }
 
 /* The largest overlap of two zones over all ranks. */
@@ -162,7 +98,8 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
   return REMAP_OK;
 }
 
-static remap_status build(remap_context *ctx, rm_arena *passing, rm_reason *reason)
+/* The overlay of meshes that move or are new, which are read again, and of others, which are as they were. Collective. */
+static remap_status build(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason)
 {
   const rm_zone    *zone;
   const rm_part    *part;
@@ -171,7 +108,7 @@ static remap_status build(remap_context *ctx, rm_arena *passing, rm_reason *reas
   rm_zone_overlap   zones[2];
   double            start = rm_seconds(), magnitude[2];
 
-  RM_TRY(read_meshes(ctx, passing, reason));
+  RM_TRY(rm_context_read_meshes(ctx, moves, passing, reason));
   RM_TRY(rm_zone_build(passing, &ctx->comm, ctx->mesh, &zone));
   RM_TRY(rm_part_build(passing, &ctx->comm, &ctx->frame, ctx->mesh, zone, &part, reason));
   RM_TRY(find_magnitudes(ctx, magnitude));
@@ -185,35 +122,77 @@ static remap_status build(remap_context *ctx, rm_arena *passing, rm_reason *reas
   return fill_stats(ctx, crossings);
 }
 
-remap_status remap_build(remap_context *ctx)
+/* Drop what rests on the last overlay and make a new one. Collective. */
+static remap_status build_anew(remap_context *ctx, const bool moves[2], rm_reason *reason)
 {
-  rm_reason    reason  = {-1, -1, ""};
-  rm_arena    *passing = NULL;
+  rm_arena    *passing = rm_arena_new();
   remap_status status;
 
-  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
-  if (rm_context_is_busy(ctx)) {
-    rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
-    rm_context_explain(ctx, REMAP_BAD_ORDER, &reason);
-    return REMAP_BAD_ORDER;
-  }
   rm_context_drop_carriers(ctx);
   ctx->mapping = NULL;
   rm_context_drop_masks(ctx);
   rm_arena_drop(ctx->arena);
   ctx->arena    = rm_arena_new();
-  passing       = rm_arena_new();
   ctx->is_built = false;
   memset(&ctx->stats, 0, sizeof ctx->stats);
-  memset(ctx->stencil, 0, sizeof ctx->stencil);
-  memset(ctx->labels, 0, sizeof ctx->labels);
   ctx->seconds_transfer = 0;
-  ctx->message[0]       = '\0';
-  status                = stage(ctx, ctx->arena && passing ? REMAP_OK : REMAP_NO_MEMORY, &reason);
-  if (status == REMAP_OK) status = build(ctx, passing, &reason);
+  status                = stage(ctx, ctx->arena && passing ? REMAP_OK : REMAP_NO_MEMORY, reason);
+  if (status == REMAP_OK) status = build(ctx, moves, passing, reason);
   rm_arena_drop(passing);
   ctx->is_built = status == REMAP_OK;
   for (int d = 0; d < 2; d++) ctx->masked[d] = ctx->mapping;
+  return status;
+}
+
+remap_status remap_build(remap_context *ctx)
+{
+  static const bool both[2] = {true, true};
+  rm_reason         reason  = {-1, -1, ""};
+  remap_status      status;
+
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  ctx->message[0] = '\0';
+  if (rm_context_is_busy(ctx)) {
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
+  } else {
+    for (int side = 0; side < 2; side++) ctx->is_turned[side] = false;
+    status = build_anew(ctx, both, &reason);
+  }
+  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
+  return status;
+}
+
+/* Take a mesh's new position over; true if it has one on this rank. */
+static bool take_motion(remap_context *ctx, int side, const remap_motion *motion)
+{
+  for (int b = 0; motion->node_xyz && b < ctx->num_blocks[side]; b++) ctx->block[side][b].node_xyz = motion->node_xyz[b];
+  if (!motion->node_xyz && !motion->matrix) return false;
+  ctx->is_turned[side] = motion->matrix != NULL;
+  if (motion->matrix) memcpy(ctx->matrix[side], motion->matrix, sizeof ctx->matrix[side]);
+  return true;
+}
+
+remap_status remap_move(remap_context *ctx, const remap_motion motion[2])
+{
+  rm_reason    reason = {-1, -1, ""};
+  remap_status status = REMAP_OK;
+
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  ctx->message[0] = '\0';
+  if (!ctx->is_built)
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "remap_move needs a successful remap_build of meshes that were not set since");
+  else if (rm_context_is_busy(ctx))
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
+  else if (!motion)
+    status = rm_fail(REMAP_BAD_ARGUMENT, &reason, -1, -1, "motion is NULL");
+  status = rm_comm_agree_reason(&ctx->comm, status, &reason);
+  if (status == REMAP_OK) {
+    int64_t any[2];
+
+    for (int side = 0; side < 2; side++) any[side] = take_motion(ctx, side, &motion[side]);
+    status = rm_comm_max_i64(&ctx->comm, any, 2);
+    if (status == REMAP_OK) status = build_anew(ctx, (const bool[2]){any[0] != 0, any[1] != 0}, &reason);
+  }
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;
 }

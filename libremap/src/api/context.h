@@ -23,14 +23,21 @@ struct remap_context {
   double        seconds_transfer;
   char          message[1024];
 
-  rm_arena         *arena; /* of everything below, dropped by the next remap_build */
+  bool          is_turned[2];  /* [side] nodes lie where matrix puts what was lent */
+  double        matrix[2][12];
+
+  rm_arena         *mesh_arena[2]; /* [side] of labels, mesh and layout, which outlive the moves of the other side */
   rm_labels         labels[2];
+  double            extent[2][6];
   rm_frame          frame;
   const rm_mesh    *mesh[2];
   rm_layout         layout[2];
+  rm_arena         *stencil_arena[2]; /* [side] */
+  const rm_stencil *stencil[2];       /* [side] of all cells; made when first needed */
+
+  rm_arena         *arena; /* of the mapping and its views, dropped by the next overlay */
   const rm_mapping *mapping;
-  const rm_stencil *stencil[2]; /* [side] of all cells; made when first needed */
-  remap_pairs_view  view[2];    /* likewise; row_offset NULL until then */
+  remap_pairs_view  view[2]; /* made when first needed; row_offset NULL until then */
   remap_stats       stats;
 
   rm_arena         *mask_arena; /* of what masks change, NULL: there are none */
@@ -49,6 +56,15 @@ void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason
  * already, else in passing; layout lives in arena. Not collective. BAD_MESH, TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side, int num_blocks, const remap_mesh *block,
                                     remap_mesh *out, rm_layout *layout, rm_reason *reason);
+
+/* Read the meshes that move, keep the other one as it is where that is possible. Collective. What is not kept lives in passing. */
+remap_status rm_context_read_meshes(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason);
+
+/* Forget meshes and their stencils. Not collective. */
+void rm_context_drop_meshes(remap_context *ctx);
+
+/* Tell the caller how far a phase is; CANCELLED if that is the answer. */
+remap_status rm_context_progress(remap_context *ctx, const char *phase, double done);
 
 /* Forget masks. Not collective. */
 void rm_context_drop_masks(remap_context *ctx);

@@ -113,7 +113,9 @@ static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_gi
   const uint8_t     *mask    = is_giving ? ctx->gives[side] : ctx->wants[side];
 
   if (*stencil) return REMAP_OK;
-  return rm_stencil_build(mask ? ctx->mask_arena : ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil);
+  if (!mask && !ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
+  RM_TRY(rm_comm_agree(&ctx->comm, mask || ctx->stencil_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  return rm_stencil_build(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil);
 }
 
 /* Make the carrier that a load needs, and what it rests on. Collective. */

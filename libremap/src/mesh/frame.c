@@ -30,21 +30,25 @@ static remap_status widen(remap_side side, const remap_mesh *given, rm_gid first
   return REMAP_OK;
 }
 
-remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason)
+remap_status rm_frame_extent(const rm_comm *comm, remap_side side, const remap_mesh *given, double extent[6], rm_reason *reason)
 {
-  double       high[6] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY}, largest = 0.0;
-  rm_gid       first_global[2];
-  remap_status status = REMAP_OK;
-  rm_frame     frame  = {1.0, {0}};
+  rm_gid       first_global;
+  remap_status status;
 
-  for (int s = 0; s < 2; s++) RM_TRY(rm_mesh_first_global(comm, &mesh[s], &first_global[s]));
-  for (int s = 0; s < 2 && status == REMAP_OK; s++) {
-    status = rm_mesh_given_check((remap_side)s, &mesh[s], first_global[s], reason);
-    if (status == REMAP_OK) status = widen((remap_side)s, &mesh[s], first_global[s], high, reason);
-  }
+  for (int i = 0; i < 6; i++) extent[i] = -INFINITY;
+  RM_TRY(rm_mesh_first_global(comm, given, &first_global));
+  status = rm_mesh_given_check(side, given, first_global, reason);
+  if (status == REMAP_OK) status = widen(side, given, first_global, extent, reason);
   RM_TRY(rm_comm_agree_reason(comm, status, reason));
-  RM_TRY(rm_comm_max_f64(comm, high, 6));
+  return rm_comm_max_f64(comm, extent, 6);
+}
 
+void rm_frame_of(const double extent[2][6], rm_frame *out)
+{
+  double   high[6], largest = 0.0;
+  rm_frame frame = {1.0, {0}};
+
+  for (int i = 0; i < 6; i++) high[i] = fmax(extent[0][i], extent[1][i]);
   if (-high[0] <= high[3]) { /* there are nodes */
     int exponent = 0;
 
@@ -57,6 +61,14 @@ remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_fr
     }
   }
   *out = frame;
+}
+
+remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason)
+{
+  double extent[2][6];
+
+  for (int s = 0; s < 2; s++) RM_TRY(rm_frame_extent(comm, (remap_side)s, &mesh[s], extent[s], reason));
+  rm_frame_of((const double(*)[6])extent, out);
   return REMAP_OK;
 }
 

@@ -46,6 +46,11 @@ typedef struct rm_mesh {
  * counts: they are checked here before anything is read (NULL arrays, negative counts, offsets that do not ascend). */
 remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason);
 
+/* The same in two steps, for meshes of which one moves: the extent of each, -min x, y, z, max x, y, z over all ranks in the caller's
+ * unit, all -INFINITY without nodes (collective); and the frame of both extents (not collective). */
+remap_status rm_frame_extent(const rm_comm *comm, remap_side side, const remap_mesh *given, double extent[6], rm_reason *reason);
+void rm_frame_of(const double extent[2][6], rm_frame *out);
+
 /* Check and convert one mesh. Collective. Volumes and centroids depend on coordinates alone, not on numbering. Only nodes that
  * faces use count. Faces meet across ranks and zones by the coordinates of their nodes (an exchange by hash); two faces join if
  * they run opposite ways: first within each zone, then what is left of all zones if it is two faces. More than two cells at one

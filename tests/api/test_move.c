@@ -1,0 +1,188 @@
+/* remap_move against a fresh build of the meshes where they went: the same bits of pairs, coverage, statistics and fields, for
+ * one mesh or both, by coordinates or by a matrix; and what it refuses. */
+#include <remap/remap.h>
+#include "meshes.h"
+#include "rt.h"
+
+typedef struct world {
+  remap_context *ctx;
+  tm_mesh       *mine[2];
+} world;
+
+static tm_mesh *make(int side)
+{
+  static const double away[12] = {1, 0, 0, .25, 0, 1, 0, .2, 0, 0, 1, .3};
+  tm_mesh *m = side ? tm_mixed((int[]){4, 4, 5}, tm_warp, &(tm_warping){0.02, 0.1}) : tm_hexahedra((int[]){5, 4, 4}, tm_warp, &(tm_warping){0.03, 0.7});
+
+  if (side) tm_move(m, tm_affine, away);
+  return m;
+}
+
+/* The same matrix arithmetic as the library promises. */
+static void put(double *to, const double *from, int64_t n, const double m[12])
+{
+  for (int64_t i = 0; i < n; i++)
+    for (int r = 0; r < 3; r++)
+      to[3 * i + r] = m[4 * r] * from[3 * i] + m[4 * r + 1] * from[3 * i + 1] + m[4 * r + 2] * from[3 * i + 2] + m[4 * r + 3];
+}
+
+/* A small rotation about an axis by lot, and a shift; now and then a jump that changes the scale of coordinates. */
+static void draw(uint64_t *state, bool far, double m[12])
+{
+  const double angle = .001 * (double)tm_random(state, 400), c = cos(angle), s = sin(angle);
+  const int    a     = (int)tm_random(state, 3), b = (a + 1) % 3, z = (a + 2) % 3;
+
+  for (int k = 0; k < 12; k++) m[k] = 0;
+  m[4 * a + a] = m[4 * b + b] = c;
+  m[4 * a + b] = -s;
+  m[4 * b + a] = s;
+  m[4 * z + z] = 1;
+  for (int r = 0; r < 3; r++) m[4 * r + 3] = .001 * (double)tm_random(state, 200) + (far ? 3 * r : 0);
+}
+
+static void open_world(world *w, const double (*where)[12], uint64_t seed)
+{
+  RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &w->ctx), REMAP_OK);
+  for (int side = 0; side < 2; side++) {
+    tm_mesh *whole = make(side);
+    int     *deal  = tm_deal(whole, rt_size(), TM_RANDOM, seed);
+    w->mine[side]  = tm_part(whole, deal, rt_rank(), seed);
+    if (where) {
+      double *xyz = tm_alloc_(3 * w->mine[side]->view.num_nodes, sizeof *xyz);
+      put(xyz, w->mine[side]->xyz, w->mine[side]->view.num_nodes, where[side]);
+      free(w->mine[side]->xyz);
+      w->mine[side]->view.node_xyz = w->mine[side]->xyz = xyz;
+    }
+    RT_EQ(remap_set_mesh(w->ctx, side, &w->mine[side]->view), REMAP_OK);
+    tm_free(whole), free(deal);
+  }
+  RT_EQ(remap_build(w->ctx), REMAP_OK);
+}
+
+static void close_world(world *w)
+{
+  remap_destroy(&w->ctx);
+  for (int side = 0; side < 2; side++) tm_free(w->mine[side]);
+}
+
+static bool same(const void *a, const void *b, int64_t n, size_t size) { return n == 0 || memcmp(a, b, (size_t)n * size) == 0; }
+
+static void compare(world *a, world *b)
+{
+  remap_stats    s[2];
+  remap_transfer how;
+
+  RT_EQ(remap_get_stats(a->ctx, &s[0]), REMAP_OK);
+  RT_EQ(remap_get_stats(b->ctx, &s[1]), REMAP_OK);
+  RT_CHECK((s[0].crossings > 0) == (s[1].crossings > 0));
+  RT_NEAR(s[0].overlap_volume, s[1].overlap_volume, 0.0);
+  remap_transfer_default(&how);
+  how.on_uncovered = s[0].pairs > 0 ? REMAP_UNCOVERED_NEAREST : REMAP_UNCOVERED_FILL;
+  for (int d = 0; d < 2; d++) {
+    const int64_t      ng = a->mine[d]->view.num_cells, nr = a->mine[1 - d]->view.num_cells;
+    remap_pairs_view   p[2];
+    double            *u = tm_alloc_(ng, sizeof *u), *v[2];
+    remap_cover       *cover[2];
+    remap_field_report report[2];
+
+    memset(report, 0, sizeof report);
+    for (int64_t c = 0; c < ng; c++) u[c] = (double)(tm_mix_((uint64_t)a->mine[d]->global[c]) % 1000);
+    for (int k = 0; k < 2; k++) {
+      world *w = k ? b : a;
+      v[k]     = tm_alloc_(nr, sizeof *u);
+      cover[k] = tm_alloc_(nr, sizeof(remap_cover));
+      const remap_field_desc f = {.nature = REMAP_CONSERVED, .in = u, .out = v[k]};
+      RT_EQ(remap_pairs(w->ctx, d, &p[k]), REMAP_OK);
+      RT_EQ(remap_coverage(w->ctx, 1 - d, NULL, cover[k]), REMAP_OK);
+      RT_EQ(remap_field(w->ctx, d, &how, 1, &f, &report[k]), REMAP_OK);
+    }
+    const int64_t n = p[0].row_offset[nr];
+    if (RT_EQ(p[1].row_offset[nr], n)) {
+      RT_CHECK(same(p[0].row_offset, p[1].row_offset, nr + 1, 8) && same(p[0].global_cell, p[1].global_cell, n, 8));
+      RT_CHECK(same(p[0].volume, p[1].volume, n, 8) && same(p[0].moment, p[1].moment, 3 * n, 8));
+    }
+    RT_CHECK(same(cover[0], cover[1], nr, sizeof **cover) && same(report, report + 1, 1, sizeof *report));
+    for (int64_t c = 0; c < nr && how.on_uncovered == REMAP_UNCOVERED_NEAREST; c++)
+      if (!RT_NEAR(v[0][c], v[1][c], 0.0)) break;
+    for (int k = 0; k < 2; k++) free(v[k]), free(cover[k]);
+    free(u);
+  }
+}
+
+static void a_move_makes_the_bits_of_a_fresh_build(void)
+{
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    double   where[2][12] = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}, *xyz[2];
+    uint64_t state        = tm_mix_(seed);
+    world    w;
+
+    open_world(&w, NULL, seed);
+    for (int side = 0; side < 2; side++) xyz[side] = tm_alloc_(3 * w.mine[side]->view.num_nodes, sizeof(double));
+    for (int step = 0; step < 6; step++) {
+      const double *list[2] = {xyz[0], xyz[1]};
+      remap_motion  motion[2] = {{NULL, NULL}, {NULL, NULL}};
+      world         fresh;
+
+      for (int side = 0; side < 2; side++) {
+        if (step % 3 == side) continue; /* in every third step both move */
+        draw(&state, step == 4, where[side]);
+        if (seed % 2) { /* by matrix */
+          motion[side].matrix = where[side];
+        } else {
+          put(xyz[side], w.mine[side]->xyz, w.mine[side]->view.num_nodes, where[side]);
+          motion[side].node_xyz = &list[side];
+        }
+      }
+      RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+      open_world(&fresh, (const double(*)[12])where, seed);
+      compare(&w, &fresh);
+      close_world(&fresh);
+    }
+    close_world(&w);
+    for (int side = 0; side < 2; side++) free(xyz[side]);
+  }
+}
+
+static void moves_are_refused_before_a_build_and_after_a_mesh_is_set(void)
+{
+  static const double turned[12] = {1, 0, 0, .01, 0, 1, 0, 0, 0, 0, 1, 0};
+  const remap_motion  motion[2]  = {{NULL, turned}, {NULL, NULL}};
+  remap_context      *empty      = NULL;
+  world               w;
+
+  RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &empty), REMAP_OK);
+  RT_EQ(remap_move(empty, motion), REMAP_BAD_ORDER);
+  RT_CHECK(strstr(remap_message(empty), "remap_build") != NULL);
+  remap_destroy(&empty);
+  open_world(&w, NULL, 5);
+  RT_EQ(remap_move(w.ctx, NULL), REMAP_BAD_ARGUMENT);
+  RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+  if (rt_rank() == 0) RT_EQ(remap_set_mesh(w.ctx, 0, &w.mine[0]->view), REMAP_OK); /* one rank forgets */
+  RT_EQ(remap_move(w.ctx, motion), REMAP_BAD_ORDER);
+  RT_EQ(remap_build(w.ctx), REMAP_OK);
+  RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+  close_world(&w);
+}
+
+static void a_move_to_nowhere_fails_on_every_rank_and_a_build_mends_it(void)
+{
+  world w;
+
+  open_world(&w, NULL, 7);
+  double *xyz = tm_alloc_(3 * w.mine[1]->view.num_nodes, sizeof *xyz);
+  memcpy(xyz, w.mine[1]->xyz, (size_t)(3 * w.mine[1]->view.num_nodes) * sizeof *xyz);
+  if (rt_rank() == rt_size() - 1 && w.mine[1]->view.num_nodes) xyz[0] = NAN;
+  const double      *list      = xyz;
+  const remap_motion motion[2] = {{NULL, NULL}, {&list, NULL}};
+  RT_EQ(remap_move(w.ctx, motion), REMAP_BAD_MESH);
+  RT_CHECK(strstr(remap_message(w.ctx), "finite") != NULL);
+  RT_EQ(remap_move(w.ctx, motion), REMAP_BAD_ORDER);
+  memcpy(xyz, w.mine[1]->xyz, (size_t)(3 * w.mine[1]->view.num_nodes) * sizeof *xyz);
+  RT_EQ(remap_build(w.ctx), REMAP_OK);
+  RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+  close_world(&w);
+  free(xyz);
+}
+
+RT_MAIN(RT_CASE(a_move_makes_the_bits_of_a_fresh_build), RT_CASE(moves_are_refused_before_a_build_and_after_a_mesh_is_set),
+        RT_CASE(a_move_to_nowhere_fails_on_every_rank_and_a_build_mends_it))
