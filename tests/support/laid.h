@@ -29,9 +29,9 @@ typedef struct laid {
   const rm_trimesh *mesh[2];
   const rm_overlay *overlay;
   const rm_moments *moments;
-  rm_lid            num[2];     /* cells of the test meshes                                                   */
-  rm_lid           *place[2];   /* [side][num] where a cell of the test mesh is in the piece, -1 if it stayed away */
-  int64_t          *row;        /* [cells of piece 0 + 1] first pair of a source cell                          */
+  rm_lid            num[2];   /* cells of the test meshes                                                   */
+  rm_lid           *place[2]; /* [side][num] where a cell of the test mesh is in the piece, -1 if it stayed away */
+  int64_t          *row;      /* [cells of piece 0 + 1] first pair of a source cell                          */
 } laid;
 
 static inline void *laid_get_(rm_arena *arena, int64_t n, size_t size)
@@ -52,9 +52,9 @@ static inline rm_frame laid_frame_(const tm_mesh *const whole[2])
     for (int64_t k = 0; k < 3 * whole[side]->view.num_nodes; k++) {
       const double x = whole[side]->xyz[k];
 
-      most                  = fmax(most, fabs(x));
-      frame.box[k % 3]      = fmin(frame.box[k % 3], x);
-      frame.box[k % 3 + 3]  = fmax(frame.box[k % 3 + 3], x);
+      most                 = fmax(most, fabs(x));
+      frame.box[k % 3]     = fmin(frame.box[k % 3], x);
+      frame.box[k % 3 + 3] = fmax(frame.box[k % 3 + 3], x);
     }
   frexp(most, &power);
   frame.scale = ldexp(1, -power);
@@ -65,13 +65,14 @@ static inline rm_frame laid_frame_(const tm_mesh *const whole[2])
 /* [num_faces] 1 where no cell lies on the other side, be it behind another face of the same coordinates. */
 static inline uint8_t *laid_skin_(rm_arena *arena, const tm_mesh *m)
 {
-  const int64_t n    = m->view.num_faces;
-  rm_keyed     *key  = laid_get_(arena, n, sizeof *key), *spare = laid_get_(arena, n, sizeof *spare);
+  const int64_t n   = m->view.num_faces;
+  rm_keyed     *key = laid_get_(arena, n, sizeof *key), *spare = laid_get_(arena, n, sizeof *spare);
   uint8_t      *skin = laid_get_(arena, n, 1);
 
   for (int64_t f = 0; f < n; f++) {
     key[f].item = f;
-    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) key[f].key += rm_hash_point(m->xyz + 3 * m->face_node[k]);
+    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++)
+      key[f].key += rm_hash_point(m->xyz + 3 * m->face_node[k]);
     skin[f] = m->neighbour[f] < 0;
   }
   rm_sort_keyed(key, spare, n);
@@ -110,17 +111,18 @@ typedef struct laid_maker_ {
   const tm_mesh *m;
   uint64_t       seed;
   int            senders;
-  int           *sender;    /* [cells of the test mesh]        */
-  rm_lid        *node_of;   /* [senders][nodes] -1 if not used */
-  double       (*xyz)[3];
-  int64_t       *offset;
-  rm_lid        *face_node, (*face_cell)[2];
-  uint8_t       *skin;
-  rm_lid         num_nodes, num_faces;
+  int           *sender;  /* [cells of the test mesh]        */
+  rm_lid        *node_of; /* [senders][nodes] -1 if not used */
+  double (*xyz)[3];
+  int64_t *offset;
+  rm_lid  *face_node, (*face_cell)[2];
+  uint8_t *skin;
+  rm_lid   num_nodes, num_faces;
 } laid_maker_;
 
 /* Add a face with owner and neighbour by their places; the loop points out of the owner. */
-static inline void laid_add_face_(laid_maker_ *k, const int64_t *node, int n, rm_lid owner, rm_lid neighbour, int sender, uint8_t skin)
+static inline void laid_add_face_(laid_maker_ *k, const int64_t *node, int n, rm_lid owner, rm_lid neighbour, int sender,
+                                  uint8_t skin)
 {
   const bool turned = owner < 0 || (neighbour >= 0 && k->seed && tm_random(&k->seed, 2));
   const int  start  = k->seed ? (int)tm_random(&k->seed, n) : 0;
@@ -146,25 +148,36 @@ static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_h
 {
   const rm_lid   num = (rm_lid)m->view.num_cells, faces = (rm_lid)m->view.num_faces;
   const int64_t  corners = m->face_offset[faces];
-  const uint8_t *skin  = laid_skin_(l->arena, m), *keep = how->keep[side];
+  const uint8_t *skin = laid_skin_(l->arena, m), *keep = how->keep[side];
   rm_lid        *order = laid_get_(l->arena, faces, sizeof *order), *cells = laid_get_(l->arena, num, sizeof *cells), n = 0;
-  int64_t       *loop  = laid_get_(l->arena, corners, sizeof *loop);
-  laid_maker_    k     = {l, m, how->shuffle ? how->shuffle + (uint64_t)side : 0, how->shuffle && how->senders > 1 ? how->senders : 1,
-                          NULL, NULL, NULL, NULL, NULL, NULL, NULL, 0, 0};
+  int64_t       *loop = laid_get_(l->arena, corners, sizeof *loop);
+  laid_maker_    k    = {l,
+                         m,
+                   how->shuffle ? how->shuffle + (uint64_t)side : 0,
+                   how->shuffle && how->senders > 1 ? how->senders : 1,
+                         NULL,
+                         NULL,
+                         NULL,
+                         NULL,
+                         NULL,
+                         NULL,
+                         NULL,
+                         0,
+                         0};
   rm_gid        *global;
   rm_lid        *home;
   int           *rank;
 
-  k.sender    = laid_get_(l->arena, num, sizeof *k.sender);
-  k.node_of   = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.node_of);
-  k.xyz       = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.xyz);
-  k.offset    = laid_get_(l->arena, 2 * (int64_t)faces + 1, sizeof *k.offset);
-  k.face_node = laid_get_(l->arena, 2 * corners, sizeof *k.face_node);
-  k.face_cell = laid_get_(l->arena, 2 * (int64_t)faces, sizeof *k.face_cell);
-  k.skin      = laid_get_(l->arena, 2 * (int64_t)faces, 1);
-  global      = laid_get_(l->arena, num, sizeof *global);
-  home        = laid_get_(l->arena, num, sizeof *home);
-  rank        = laid_get_(l->arena, num, sizeof *rank);
+  k.sender       = laid_get_(l->arena, num, sizeof *k.sender);
+  k.node_of      = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.node_of);
+  k.xyz          = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.xyz);
+  k.offset       = laid_get_(l->arena, 2 * (int64_t)faces + 1, sizeof *k.offset);
+  k.face_node    = laid_get_(l->arena, 2 * corners, sizeof *k.face_node);
+  k.face_cell    = laid_get_(l->arena, 2 * (int64_t)faces, sizeof *k.face_cell);
+  k.skin         = laid_get_(l->arena, 2 * (int64_t)faces, 1);
+  global         = laid_get_(l->arena, num, sizeof *global);
+  home           = laid_get_(l->arena, num, sizeof *home);
+  rank           = laid_get_(l->arena, num, sizeof *rank);
   l->num[side]   = num;
   l->place[side] = laid_get_(l->arena, num, sizeof **l->place);
   for (int64_t v = 0; v < k.senders * m->view.num_nodes; v++) k.node_of[v] = -1;
@@ -182,8 +195,8 @@ static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_h
   }
   laid_permute_(order, faces, &k.seed);
   for (rm_lid i = 0; i < faces; i++) {
-    const rm_lid  f     = order[i];
-    const int     len   = laid_loop_(m, f, loop);
+    const rm_lid  f   = order[i];
+    const int     len = laid_loop_(m, f, loop);
     const int64_t a = m->owner[f], b = m->neighbour[f];
     const rm_lid  owner = l->place[side][a], neighbour = b < 0 ? -1 : l->place[side][b];
 
@@ -195,8 +208,19 @@ static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_h
       if (neighbour >= 0) laid_add_face_(&k, loop, len, -1, neighbour, k.sender[b], skin[f]);
     }
   }
-  l->part.piece[side] = (rm_piece){k.num_nodes, k.num_faces, n, (const double (*)[3])k.xyz, k.offset, k.face_node,
-                                   (const rm_lid (*)[2])k.face_cell, k.skin, global, rank, home, NULL, NULL};
+  l->part.piece[side] = (rm_piece){k.num_nodes,
+                                   k.num_faces,
+                                   n,
+                                   (const double(*)[3])k.xyz,
+                                   k.offset,
+                                   k.face_node,
+                                   (const rm_lid(*)[2])k.face_cell,
+                                   k.skin,
+                                   global,
+                                   rank,
+                                   home,
+                                   NULL,
+                                   NULL};
 }
 
 /* Volumes and centroids of the cells as they are triangulated, in an order that depends on coordinates alone. */
@@ -204,16 +228,16 @@ static inline void laid_measure_(laid *l, int side)
 {
   const rm_trimesh *m      = l->mesh[side];
   double           *volume = laid_get_(l->arena, m->num_cells, sizeof *volume);
-  double          (*centroid)[3] = laid_get_(l->arena, m->num_cells, sizeof *centroid);
+  double(*centroid)[3]     = laid_get_(l->arena, m->num_cells, sizeof *centroid);
 
   for (rm_lid c = 0; c < m->num_cells; c++) {
-    const double *box   = m->cell_box[c];
-    const double  o[3]  = {box[0] + .5 * (box[3] - box[0]), box[1] + .5 * (box[4] - box[1]), box[2] + .5 * (box[5] - box[2])};
+    const double *box    = m->cell_box[c];
+    const double  o[3]   = {box[0] + .5 * (box[3] - box[0]), box[1] + .5 * (box[4] - box[1]), box[2] + .5 * (box[5] - box[2])};
     double        sum[4] = {0, 0, 0, 0}, low = 0;
 
     for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++) {
-      const rm_lid *t = m->triangle[m->cell_triangle[a] / 2];
-      const rm_dd   d = rm_det_dd(o, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]);
+      const rm_lid *t    = m->triangle[m->cell_triangle[a] / 2];
+      const rm_dd   d    = rm_det_dd(o, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]);
       const double  sign = m->cell_triangle[a] & 1 ? -1 : 1, old = sum[0], x = sign * d.hi;
 
       sum[0] += x;
@@ -226,15 +250,15 @@ static inline void laid_measure_(laid *l, int side)
     for (int k = 0; k < 3; k++) centroid[c][k] = sum[0] != 0 ? o[k] + sum[1 + k] / (4 * sum[0]) : o[k];
   }
   l->part.piece[side].cell_volume   = volume;
-  l->part.piece[side].cell_centroid = (const double (*)[3])centroid;
+  l->part.piece[side].cell_centroid = (const double(*)[3])centroid;
 }
 
 /* Lay source and target over one another; how may be NULL. Owned by the caller: laid_free. */
 static inline laid *laid_over(const tm_mesh *source, const tm_mesh *target, remap_faces faces, const laid_how *how)
 {
-  static const laid_how plain = {{NULL, NULL}, 0, 0, 0};
+  static const laid_how plain    = {{NULL, NULL}, 0, 0, 0};
   const tm_mesh *const  whole[2] = {source, target};
-  laid                 *l = tm_alloc_(1, sizeof *l);
+  laid                 *l        = tm_alloc_(1, sizeof *l);
 
   how       = how ? how : &plain;
   l->arena  = rm_arena_new();
@@ -247,7 +271,8 @@ static inline laid *laid_over(const tm_mesh *source, const tm_mesh *target, rema
     if (l->status == REMAP_OK) laid_measure_(l, side);
   }
   if (l->status == REMAP_OK) l->status = rm_overlay_build(l->arena, l->mesh, &l->part, NULL, &l->overlay, &l->reason);
-  if (l->status == REMAP_OK) l->status = rm_moments_build(l->arena, &l->part, l->overlay, how->degree ? how->degree : 1, &l->moments);
+  if (l->status == REMAP_OK)
+    l->status = rm_moments_build(l->arena, &l->part, l->overlay, how->degree ? how->degree : 1, &l->moments);
   if (l->status != REMAP_OK) return l;
   l->row = laid_get_(l->arena, (int64_t)l->part.piece[0].num_cells + 1, sizeof *l->row);
   for (int64_t k = 0; k < l->moments->num_pairs; k++) l->row[l->moments->source[k] + 1] = k + 1;
@@ -282,13 +307,16 @@ static inline double laid_volume(const laid *l, rm_lid i, rm_lid j)
 }
 
 /* Volume of cell c of the test mesh. */
-static inline double laid_cell_volume(const laid *l, int side, rm_lid c) { return l->part.piece[side].cell_volume[l->place[side][c]]; }
+static inline double laid_cell_volume(const laid *l, int side, rm_lid c)
+{
+  return l->part.piece[side].cell_volume[l->place[side][c]];
+}
 
 /* How a cell is covered, as the flags of its pairs say: what the mapping room makes of them. */
 static inline remap_cover laid_cover(const laid *l, int side, rm_lid c)
 {
-  const rm_lid *own  = side == 0 ? l->moments->source : l->moments->target;
-  const int     skin = side == 0 ? RM_PAIR_TARGET_SKIN : RM_PAIR_SOURCE_SKIN;
+  const rm_lid *own   = side == 0 ? l->moments->source : l->moments->target;
+  const int     skin  = side == 0 ? RM_PAIR_TARGET_SKIN : RM_PAIR_SOURCE_SKIN;
   remap_cover   cover = REMAP_UNCOVERED;
 
   for (int64_t k = 0; k < l->moments->num_pairs; k++) {
@@ -302,8 +330,8 @@ static inline remap_cover laid_cover(const laid *l, int side, rm_lid c)
 /* Largest abs(sum of V over a cell's pairs - V_c) / abs(V_c) over the cells of one side that `asked` (NULL: all) names. */
 static inline double laid_closure(const laid *l, int side, const uint8_t *asked)
 {
-  const rm_lid *own = side == 0 ? l->moments->source : l->moments->target;
-  long double  *sum = laid_get_(l->arena, l->part.piece[side].num_cells, sizeof *sum);
+  const rm_lid *own   = side == 0 ? l->moments->source : l->moments->target;
+  long double  *sum   = laid_get_(l->arena, l->part.piece[side].num_cells, sizeof *sum);
   double        worst = 0;
 
   for (int64_t k = 0; k < l->moments->num_pairs; k++) sum[own[k]] += (long double)l->moments->volume[k];

@@ -20,11 +20,11 @@ typedef struct oracle_point {
 
 typedef struct oracle {
   const laid  *l;
-  int          power;     /* coordinates are multiplied by 2^power */
-  oracle_int3 *vertex[2]; /* [side][num_vertices]                  */
+  int          power;                     /* coordinates are multiplied by 2^power */
+  oracle_int3 *vertex[2];                 /* [side][num_vertices]                  */
   oracle_point corner[2][4], fresh[4][4]; /* of two tetrahedra; made by clipping with one plane */
   mpq_t        normal[4][3], offset[4];   /* planes of the second, inside is positive           */
-  mpq_t        height[4][4], sum[4];      /* 6 |T n B|, 24 times its moment                     */
+  mpq_t        height[4][4], sum[10];     /* 6 |T n B|, 24 M, 120 S (xx, yy, zz, xy, xz, yz)    */
   mpq_t        s, t;                      /* scratch                                            */
   oracle_int3  u, v, w, n;
   mpz_t        x, y;
@@ -63,7 +63,7 @@ static inline oracle *oracle_new(const laid *l)
       for (int c = 0; c < 3; c++) mpz_init_set_d(o->vertex[side][v].c[c], ldexp(m->vertex[v][c], o->power));
   }
   for (int k = 0; k < 4; k++) {
-    mpq_init(o->offset[k]), mpq_init(o->sum[k]);
+    mpq_init(o->offset[k]);
     for (int c = 0; c < 3; c++) {
       mpq_init(o->normal[k][c]);
       for (int h = 0; h < 2; h++) mpq_init(o->corner[h][k].c[c]);
@@ -72,6 +72,7 @@ static inline oracle *oracle_new(const laid *l)
     for (int h = 0; h < 4; h++) mpq_init(o->height[k][h]);
   }
   for (int c = 0; c < 3; c++) mpz_inits(o->u.c[c], o->v.c[c], o->w.c[c], o->n.c[c], NULL);
+  for (int k = 0; k < 10; k++) mpq_init(o->sum[k]);
   mpz_inits(o->x, o->y, NULL);
   mpq_inits(o->s, o->t, NULL);
   return o;
@@ -85,7 +86,7 @@ static inline void oracle_free(oracle *o)
     free(o->vertex[side]);
   }
   for (int k = 0; k < 4; k++) {
-    mpq_clear(o->offset[k]), mpq_clear(o->sum[k]);
+    mpq_clear(o->offset[k]);
     for (int c = 0; c < 3; c++) {
       mpq_clear(o->normal[k][c]);
       for (int h = 0; h < 2; h++) mpq_clear(o->corner[h][k].c[c]);
@@ -94,6 +95,7 @@ static inline void oracle_free(oracle *o)
     for (int h = 0; h < 4; h++) mpq_clear(o->height[k][h]);
   }
   for (int c = 0; c < 3; c++) mpz_clears(o->u.c[c], o->v.c[c], o->w.c[c], o->n.c[c], NULL);
+  for (int k = 0; k < 10; k++) mpq_clear(o->sum[k]);
   mpz_clears(o->x, o->y, NULL);
   mpq_clears(o->s, o->t, NULL);
   free(o);
@@ -160,7 +162,7 @@ static inline int oracle_crosses_(oracle *o, int side, rm_lid e, rm_lid t)
 {
   const rm_trimesh  *own = o->l->mesh[side], *other = o->l->mesh[1 - side];
   const oracle_int3 *p0 = &o->vertex[side][own->edge[e][0]], *p1 = &o->vertex[side][own->edge[e][1]];
-  const rm_lid      *k = other->triangle[t];
+  const rm_lid      *k     = other->triangle[t];
   const int          moved = side == 0 ? 1 : -1;
   int                s[3], a, b;
 
@@ -208,11 +210,11 @@ static inline void oracle_check_crossings(oracle *o, int side)
 
   for (int c = 0; c < 4; c++) mpq_inits(place[0][c], place[1][c], NULL);
   for (rm_lid e = 0; e < own->num_edges; e++) {
-    const rm_crossing *list = trace->crossing + trace->first[e];
+    const rm_crossing *list  = trace->crossing + trace->first[e];
     rm_lid             found = 0;
 
     for (rm_lid t = 0; t < other->num_triangles; t++) {
-      const int s = oracle_crosses_(o, side, e, t);
+      const int s      = oracle_crosses_(o, side, e, t);
       bool      listed = false;
 
       if (!s) continue;
@@ -257,12 +259,14 @@ static inline void oracle_det_(oracle *o, mpq_t out, const oracle_point *const p
     for (int c = 0; c < 3; c++) mpq_clear(e[k].c[c]);
 }
 
-/* Add 6 volume and 24 moment of the tetrahedron, signed by sign alone. */
+static const int oracle_row_[6] = {0, 1, 2, 0, 0, 1}, oracle_column_[6] = {0, 1, 2, 1, 2, 2};
+
+/* Add 6 volume, 24 moment and, where the overlay has them, 120 second moments of the tetrahedron, signed by sign alone. */
 static inline void oracle_add_(oracle *o, const oracle_point *const p[4], int sign)
 {
-  mpq_t det, x;
+  mpq_t det, x, total[3];
 
-  mpq_inits(det, x, NULL);
+  mpq_inits(det, x, total[0], total[1], total[2], NULL);
   oracle_det_(o, det, p);
   if (mpq_sgn(det) * sign < 0) mpq_neg(det, det);
   mpq_add(o->sum[0], o->sum[0], det);
@@ -270,15 +274,22 @@ static inline void oracle_add_(oracle *o, const oracle_point *const p[4], int si
     mpq_add(x, p[0]->c[c], p[1]->c[c]);
     mpq_add(x, x, p[2]->c[c]);
     mpq_add(x, x, p[3]->c[c]);
+    mpq_set(total[c], x);
     mpq_mul(x, x, det);
     mpq_add(o->sum[1 + c], o->sum[1 + c], x);
   }
-  mpq_clears(det, x, NULL);
+  for (int k = 0; k < 6 && o->l->moments->second; k++) {
+    mpq_mul(x, total[oracle_row_[k]], total[oracle_column_[k]]);
+    for (int v = 0; v < 4; v++) mpq_mul(o->s, p[v]->c[oracle_row_[k]], p[v]->c[oracle_column_[k]]), mpq_add(x, x, o->s);
+    mpq_mul(x, x, det);
+    mpq_add(o->sum[4 + k], o->sum[4 + k], x);
+  }
+  mpq_clears(det, x, total[0], total[1], total[2], NULL);
 }
 
 /* The point where a -> b meets the plane over which their heights are. */
-static inline const oracle_point *oracle_cut_(oracle *o, oracle_point *out, const oracle_point *a, const oracle_point *b, const mpq_t ha,
-                                              const mpq_t hb)
+static inline const oracle_point *oracle_cut_(oracle *o, oracle_point *out, const oracle_point *a, const oracle_point *b,
+                                              const mpq_t ha, const mpq_t hb)
 {
   mpq_sub(o->s, ha, hb);
   mpq_div(o->s, ha, o->s);
@@ -336,7 +347,7 @@ static inline void oracle_clip_(oracle *o, const oracle_point *const p[4], int k
  * triangle's left. */
 static inline int oracle_tetrahedron_(oracle *o, int side, rm_lid apex, rm_lid t, double box[6])
 {
-  const rm_trimesh *m = o->l->mesh[side];
+  const rm_trimesh *m    = o->l->mesh[side];
   const rm_lid      v[4] = {m->triangle[t][0], m->triangle[t][1], m->triangle[t][2], apex};
 
   for (int c = 0; c < 6; c++) box[c] = c < 3 ? INFINITY : -INFINITY;
@@ -391,7 +402,7 @@ static inline void oracle_integrate(oracle *o, rm_lid i, rm_lid j)
   const rm_lid      a1 = m1->triangle[m1->cell_triangle[m1->cell_triangle_offset[i]] / 2][0];
   const rm_lid      a2 = m2->triangle[m2->cell_triangle[m2->cell_triangle_offset[j]] / 2][0];
 
-  for (int k = 0; k < 4; k++) mpq_set_ui(o->sum[k], 0, 1);
+  for (int k = 0; k < 10; k++) mpq_set_ui(o->sum[k], 0, 1);
   for (rm_lid b = m2->cell_triangle_offset[j]; b < m2->cell_triangle_offset[j + 1]; b++) {
     double    box2[6], box1[6];
     const int s2 = oracle_tetrahedron_(o, 1, a2, m2->cell_triangle[b] / 2, box2);
@@ -442,37 +453,64 @@ static inline double oracle_value_(const oracle *o, const mpq_t x, int count, in
   return value;
 }
 
+/* What is asked besides the crossings, V, M and S. */
+typedef enum oracle_demand {
+  ORACLE_EXACT,  /* the pairs are those of volumes that are not zero, and every cell's cover follows from them    */
+  ORACLE_TANGLED /* neither, as there are inverted or tangled cells; bars by their boxes, as volumes may vanish   */
+} oracle_demand;
+
 /* ---- the comparison ------------------------------------------------------------------------------------------------- */
 
-static inline void oracle_check_pair_(oracle *o, rm_lid i, rm_lid j, bool tangled)
+static inline double oracle_box_volume_(const laid *l, int side, rm_lid c)
+{
+  const double *box = l->mesh[side]->cell_box[l->place[side][c]];
+  return (box[3] - box[0]) * (box[4] - box[1]) * (box[5] - box[2]);
+}
+
+static inline void oracle_check_pair_(oracle *o, rm_lid i, rm_lid j, oracle_demand demand)
 {
   const laid   *l = o->l;
   const int64_t k = laid_pair(l, i, j);
   const double *c = l->part.piece[0].cell_centroid[l->place[0][i]], *box = l->mesh[0]->cell_box[l->place[0][i]];
-  const double  least = fmin(fabs(laid_cell_volume(l, 0, i)), fabs(laid_cell_volume(l, 1, j)));
+  const double  least = demand == ORACLE_TANGLED ? fmin(oracle_box_volume_(l, 0, i), oracle_box_volume_(l, 1, j))
+                                                 : fmin(fabs(laid_cell_volume(l, 0, i)), fabs(laid_cell_volume(l, 1, j)));
   const double  size = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])), want = oracle_value_(o, o->sum[0], 6, 3);
-  mpq_t         x;
+  mpq_t         about[3], moment[3], x;
 
-  if (!tangled && (k >= 0) != (mpq_sgn(o->sum[0]) != 0))
+  if (demand == ORACLE_EXACT && (k >= 0) != (mpq_sgn(o->sum[0]) != 0))
     rt_fail_(__FILE__, __LINE__, "pair (%d, %d) of volume %.17g %s (%.17g)", i, j, want, k >= 0 ? "is listed" : "is missing",
              k >= 0 ? l->moments->volume[k] : 0.0);
   RT_NEAR(k >= 0 ? l->moments->volume[k] : 0.0, want, 1e-13 * least);
   if (k < 0) return;
   mpq_init(x);
   for (int d = 0; d < 3; d++) {
-    mpq_set_d(x, ldexp(c[d], o->power) * 4);
+    mpq_inits(about[d], moment[d], NULL);
+    mpq_set_d(about[d], ldexp(c[d], o->power));
+    mpq_set_ui(x, 4, 1);
+    mpq_mul(x, x, about[d]);
     mpq_mul(x, x, o->sum[0]);
-    mpq_sub(x, o->sum[1 + d], x);
-    RT_NEAR(l->moments->moment[k][d], oracle_value_(o, x, 24, 4), 1e-13 * least * size);
+    mpq_sub(moment[d], o->sum[1 + d], x);
+    RT_NEAR(l->moments->moment[k][d], oracle_value_(o, moment[d], 24, 4), 1e-13 * least * size);
   }
+  for (int h = 0; h < 6 && l->moments->second; h++) { /* S about c = S - c M(c) - M c */
+    const int a = oracle_row_[h], b = oracle_column_[h];
+
+    mpq_mul(x, about[a], moment[b]);
+    mpq_mul(o->s, about[b], o->sum[1 + a]);
+    mpq_add(x, x, o->s);
+    mpq_set_ui(o->s, 5, 1);
+    mpq_mul(x, x, o->s);
+    mpq_sub(x, o->sum[4 + h], x);
+    RT_NEAR(l->moments->second[k][h], oracle_value_(o, x, 120, 5), 1e-13 * least * size * size);
+  }
+  for (int d = 0; d < 3; d++) mpq_clears(about[d], moment[d], NULL);
   mpq_clear(x);
 }
 
-/* Compare an overlay with the oracle: the crossings, the set of pairs of volume, V and M, and how every cell is covered. The
- * sets and the cover are asked of meshes without inverted or tangled cells only. */
-static inline void oracle_check(const laid *l, bool tangled)
+/* Compare an overlay with the oracle: the crossings, the set of pairs, V, M and S, and how every cell is covered. */
+static inline void oracle_check(const laid *l, oracle_demand demand)
 {
-  oracle *o     = oracle_new(l);
+  oracle *o = oracle_new(l);
   mpq_t  *total[2], cell;
 
   mpq_init(cell);
@@ -491,7 +529,7 @@ static inline void oracle_check(const laid *l, bool tangled)
       oracle_integrate(o, l->place[0][i], l->place[1][j]);
       mpq_add(total[0][i], total[0][i], o->sum[0]);
       mpq_add(total[1][j], total[1][j], o->sum[0]);
-      oracle_check_pair_(o, i, j, tangled);
+      oracle_check_pair_(o, i, j, demand);
     }
   for (int side = 0; side < 2; side++) {
     for (rm_lid c = 0; c < l->num[side]; c++) {
@@ -500,9 +538,11 @@ static inline void oracle_check(const laid *l, bool tangled)
         continue;
       }
       oracle_cell(o, side, l->place[side][c], cell);
-      const remap_cover want = !mpq_sgn(total[side][c]) ? REMAP_UNCOVERED : mpq_equal(total[side][c], cell) ? REMAP_COVERED : REMAP_PARTIAL;
+      const remap_cover want = !mpq_sgn(total[side][c])          ? REMAP_UNCOVERED
+                               : mpq_equal(total[side][c], cell) ? REMAP_COVERED
+                                                                 : REMAP_PARTIAL;
       const remap_cover got  = laid_cover(l, side, c);
-      if (!tangled && got != want)
+      if (demand == ORACLE_EXACT && got != want)
         rt_fail_(__FILE__, __LINE__, "cell %d of mesh %d has cover %d, want %d (%.17g of %.17g)", c, side, got, want,
                  oracle_value_(o, total[side][c], 6, 3), oracle_value_(o, cell, 6, 3));
       mpq_clear(total[side][c]);
