@@ -12,7 +12,8 @@ enum {
 };
 
 /* Pairs of this rank's pieces. Read-only once built. Invariants: a pair is listed once, in the order of sources and in no
- * particular order within a source; it is listed if its exact volume is not zero, or as RM_PAIR_EMPTY; coordinates are in the mesh room's frame. */
+ * particular order within a source; it is listed if its exact volume is not zero, or as RM_PAIR_EMPTY; coordinates are in the mesh
+ * room's frame. */
 typedef struct rm_moments {
   int64_t        num_pairs;
   const rm_lid  *source, *target; /* [num_pairs] cells of part->piece[0] and [1]                                       */
