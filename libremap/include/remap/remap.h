@@ -114,7 +114,8 @@ typedef enum remap_on_partial {
   REMAP_PARTIAL_ERROR     = 3  /**< remap_field returns REMAP_COVERAGE */
 } remap_on_partial;
 
-/** How much of a cell the other mesh covers. Decided exactly, not by a threshold. */
+/** How much of a cell the other mesh covers. Decided by whether that mesh's skin passes through the cell, exactly; a part left over
+ *  that is not even rounding of the cell's volume (2^-44 of it) does not count. */
 typedef enum remap_cover {
   REMAP_UNCOVERED = 0, /**< no pair */
   REMAP_PARTIAL   = 1, /**< pairs, and a part outside of the other mesh */
