@@ -627,8 +627,12 @@ static rcgns_status orient_zones(rcgns_file *file, const int64_t *first_face, rc
   int64_t       *node   = mesh->face_node.item;
   const double  *xyz    = mesh->xyz.item;
   double        *volume = calloc((size_t)file->num_zones, sizeof *volume);
+  rcgns_status   status = rc_agree(file->comm, volume ? RCGNS_OK : rc_no_memory(message), message);
 
-  RC_TRY(rc_agree(file->comm, volume ? RCGNS_OK : rc_no_memory(message), message));
+  if (status != RCGNS_OK) {
+    free(volume);
+    return status;
+  }
   for (int64_t z = 0; z < file->num_zones; z++)
     for (int64_t f = first_face[z]; f < first_face[z + 1]; f++)
       if (neighbour[f] < 0)
