@@ -129,7 +129,8 @@ typedef struct remap_context remap_context;
 /** Options of a context. Start from remap_options_default(). */
 typedef struct remap_options {
   remap_faces faces;     /**< triangulation of faces, both meshes; default REMAP_FACES_CENTRE */
-  int         max_order; /**< highest order that remap_field will be asked for: 1, 2; default 2 */
+  int         max_order; /**< highest order that remap_field will be asked for: 1, 2 or 3; default 2. 3 costs memory: pairs get
+                              second moments */
   int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP where zones of one mesh overlap by more
                                           than rounding inside the other mesh; 0 (default): remap_stats tells */
 
@@ -173,7 +174,7 @@ typedef struct remap_mesh {
 
 /** How remap_field transfers. Start from remap_transfer_default(). */
 typedef struct remap_transfer {
-  int                order;        /**< 1 or 2, not above options.max_order; default 2 */
+  int                order;        /**< 1, 2 or 3, not above options.max_order; default 2 */
   remap_limiter      limiter;      /**< default REMAP_LIMITER_AUTO */
   remap_on_uncovered on_uncovered; /**< default REMAP_UNCOVERED_KEEP */
   remap_on_partial   on_partial;   /**< default REMAP_PARTIAL_BLEND */
@@ -214,6 +215,7 @@ typedef struct remap_field_report {
   double  conservation_error; /**< their difference over the sum of abs(u) V */
   double  source_min, source_max, target_min, target_max;
   int64_t limited_cells;      /**< giving cells whose slope was reduced */
+  int64_t order_reduced_cells; /**< giving cells that order 3 found too few neighbours for: order 2 there */
 } remap_field_report;
 
 /** What remap_build found, over all ranks; the same on every rank but for seconds_transfer. Volumes in the caller's unit cubed. */
@@ -247,6 +249,7 @@ typedef struct remap_pairs_view {
   const double  *volume;     /**< [same] V */
   const double  *moment;     /**< [same][3] integral of (x - c), c the centroid of the giving cell */
   const uint8_t *same;       /**< [same] 1: the two cells cover each other alone */
+  const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 */
 } remap_pairs_view;
 
 /** A short text for a status; static text, never NULL. Not collective. */

@@ -40,7 +40,7 @@ static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_p
   }
   RM_TRY(rm_context_progress(ctx, "triangulation", 1));
   RM_TRY(rm_overlay_build(arena, mesh, part, &progress, overlay, reason));
-  RM_TRY(rm_moments_build(arena, part, *overlay, 1, moments));
+  RM_TRY(rm_moments_build(arena, part, *overlay, ctx->options.max_order > 2 ? 2 : 1, moments));
   return rm_context_progress(ctx, "volumes and moments", 1);
 }
 

@@ -41,7 +41,7 @@ void remap_transfer_default(remap_transfer *transfer)
 
 static bool options_are_good(const remap_options *o)
 {
-  return (o->faces == REMAP_FACES_CENTRE || o->faces == REMAP_FACES_DIAGONAL) && o->max_order >= 1 && o->max_order <= 2;
+  return (o->faces == REMAP_FACES_CENTRE || o->faces == REMAP_FACES_DIAGONAL) && o->max_order >= 1 && o->max_order <= 3;
 }
 
 remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_context **out)

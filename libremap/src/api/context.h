@@ -34,6 +34,8 @@ struct remap_context {
   rm_layout         layout[2];
   rm_arena         *stencil_arena[2]; /* [side] */
   const rm_stencil *stencil[2];       /* [side] of all cells; made when first needed */
+  const rm_stencil *wide[2];          /* [side] likewise, for order 3                */
+  const double    (*second[2])[6];    /* [side] likewise, rm_mesh_second             */
 
   rm_arena         *arena; /* of the mapping and its views, dropped by the next overlay */
   const rm_mapping *mapping;
@@ -43,7 +45,7 @@ struct remap_context {
   rm_arena         *mask_arena; /* of what masks change, NULL: there are none */
   const uint8_t    *gives[2], *wants[2]; /* [side] NULL: all do, on every rank */
   const rm_mapping *masked[2];           /* [direction] what transfers see; mapping itself without masks */
-  const rm_stencil *giving_stencil[2], *wanting_stencil[2]; /* [side] among cells that give, or want */
+  const rm_stencil *giving_stencil[2], *giving_wide[2], *wanting_stencil[2]; /* [side] among cells that give, or want */
   rm_arena         *carrier_arena[2]; /* [direction] of the carrier alone, which is made anew when more has to fit in */
   rm_carrier       *carrier[2];       /* [direction] NULL until needed                                                */
   rm_load           load[2];          /* [direction] that the carrier is made for                                     */

@@ -87,7 +87,14 @@ static const rm_stencil **stencil_of(remap_context *ctx, remap_side side, bool i
   return ctx->wants[side] ? &ctx->wanting_stencil[side] : &ctx->stencil[side];
 }
 
-static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction)
+/* Likewise the wider one for order 3. */
+static const rm_stencil **wide_of(remap_context *ctx, remap_side side)
+{
+  return ctx->gives[side] ? &ctx->giving_wide[side] : &ctx->wide[side];
+}
+
+/* is_wide: with what order 3 needs. */
+static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction, bool is_wide)
 {
   const remap_side  giving = giver_of(direction), receiving = 1 - giving;
   const rm_mapping *mapping = ctx->masked[direction];
@@ -98,8 +105,9 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction)
                              .receiving         = ctx->mesh[receiving],
                              .rows              = &mapping->rows[receiving],
                              .giving_rows       = &mapping->rows[giving],
-                             .giving_stencil    = *stencil_of(ctx, giving, true),
+                             .giving_stencil    = is_wide ? *wide_of(ctx, giving) : *stencil_of(ctx, giving, true),
                              .receiving_stencil = *stencil_of(ctx, receiving, false),
+                             .receiving_second  = ctx->second[receiving],
                              .giving_layout     = ctx->layout[giving],
                              .receiving_layout  = ctx->layout[receiving],
                              .any_partial       = mapping->cells_by_cover[receiving][REMAP_PARTIAL] > 0,
@@ -118,6 +126,24 @@ static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_gi
   return rm_stencil_build(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil);
 }
 
+/* Second moments of both sides' cells, and the wider stencil of the giving side, whose stencil is there. Collective. */
+static remap_status need_wide(remap_context *ctx, remap_side giving)
+{
+  const rm_stencil **wide   = wide_of(ctx, giving);
+  remap_status       status = REMAP_OK;
+
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
+    if (ctx->second[side]) continue;
+    if (!ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
+    status = !ctx->stencil_arena[side] ? REMAP_NO_MEMORY
+                                       : rm_mesh_second(ctx->stencil_arena[side], ctx->mesh[side], ctx->options.faces, &ctx->second[side]);
+  }
+  RM_TRY(rm_comm_agree(&ctx->comm, status, NULL));
+  if (*wide) return REMAP_OK;
+  return rm_stencil_widen(ctx->gives[giving] ? ctx->mask_arena : ctx->stencil_arena[giving], &ctx->comm, &ctx->frame,
+                          ctx->mesh[giving], ctx->second[giving], *stencil_of(ctx, giving, true), wide);
+}
+
 /* Make the carrier that a load needs, and what it rests on. Collective. */
 static remap_status prepare(remap_context *ctx, remap_direction direction, rm_load load, rm_reason *reason)
 {
@@ -130,7 +156,8 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
   RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
   if (load.has_nearest) RM_TRY(need_stencil(ctx, 1 - giving, false));
-  const rm_transfer_setup setup = setup_of(ctx, direction);
+  if (load.is_wide) RM_TRY(need_wide(ctx, giving));
+  const rm_transfer_setup setup = setup_of(ctx, direction, load.is_wide);
   RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));
   ctx->load[direction] = load;
   return REMAP_OK;
@@ -142,7 +169,7 @@ static remap_status start(remap_context *ctx, remap_direction direction, const r
   remap_status mine;
 
   RM_TRY(check_agreed(ctx, direction, how, num_fields, fields, reason));
-  const rm_transfer_setup setup = setup_of(ctx, direction);
+  const rm_transfer_setup setup = setup_of(ctx, direction, false);
   const rm_load           load  = rm_load_of(&setup, how, num_fields, fields);
   const uint64_t          mark  = mark_of(direction, how, num_fields, fields);
   mine = check_own(ctx, direction, num_fields, fields, reason);

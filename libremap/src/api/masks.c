@@ -11,6 +11,7 @@ void rm_context_drop_masks(remap_context *ctx)
     ctx->gives[k] = ctx->wants[k] = NULL;
     ctx->masked[k]          = ctx->mapping;
     ctx->giving_stencil[k]  = NULL;
+    ctx->giving_wide[k]     = NULL;
     ctx->wanting_stencil[k] = NULL;
   }
   memset(ctx->view, 0, sizeof ctx->view);

@@ -93,6 +93,8 @@ static void drop_stencil(remap_context *ctx, int side)
   rm_arena_drop(ctx->stencil_arena[side]);
   ctx->stencil_arena[side] = NULL;
   ctx->stencil[side]       = NULL;
+  ctx->wide[side]          = NULL;
+  ctx->second[side]        = NULL;
 }
 
 /* The arrays of the sides that are read, and the frame of both. Collective. */

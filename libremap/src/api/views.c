@@ -74,20 +74,22 @@ remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pa
   remap_pairs_view *view = &ctx->view[direction];
   int64_t          *global;
   int              *rank;
-  double           *volume, *moment;
+  double           *volume, *moment, *second = NULL;
 
   if (!view->row_offset) {
     RM_NEW(global, arena, n);
     RM_NEW(rank, arena, n);
     RM_NEW(volume, arena, n);
     RM_NEW(moment, arena, 3 * n);
+    if (rows->second) RM_NEW(second, arena, 6 * n);
     for (int64_t k = 0; k < n; k++) {
       global[k] = rows->giver_global[rows->giver[k]];
       rank[k]   = rows->giver_rank[rows->giver[k]];
       volume[k] = rows->volume[k] * cubed;
       for (int a = 0; a < 3; a++) moment[3 * k + a] = rows->moment[k][a] * cubed * unit;
+      for (int a = 0; a < 6 && second; a++) second[6 * k + a] = rows->second[k][a] * cubed * unit * unit;
     }
-    *view = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same};
+    *view = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same, second};
   }
   *out = *view;
   return REMAP_OK;

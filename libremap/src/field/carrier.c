@@ -22,7 +22,7 @@ struct rm_carrier {
   double           *given;      /* [giving cells][num_fields] as the caller gave them            */
   double           *pack;       /* [giving cells][width]                                        */
   double           *value;      /* [receiving cells][num_fields] old values, then new ones      */
-  int64_t          *limited;    /* [num_fields] on this rank                                    */
+  int64_t          *limited;    /* [2][num_fields] on this rank; behind it the cells of reduced order */
   rm_integral      *integral;   /* [num_fields]                                                 */
   double           *extreme;    /* [4][num_fields] least, least, greatest, greatest              */
 
@@ -56,14 +56,15 @@ static bool needs_bounds(const rm_transfer_setup *setup, const remap_transfer *h
 
 rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
 {
-  const int width = needs_bounds(setup, how, num_fields, fields) ? 6 : 4;
-  rm_load   load  = {.num_fields = num_fields};
+  const bool has_bounds = needs_bounds(setup, how, num_fields, fields);
+  rm_load    load       = {.num_fields = num_fields};
 
   for (int f = 0; f < num_fields; f++) {
     const bool is_sloped = has_slope(how, &fields[f]);
 
-    load.width += is_sloped ? width : 1;
+    load.width += rm_pack_width(is_sloped ? how->order : 1, has_bounds);
     load.has_slopes |= is_sloped;
+    load.is_wide |= is_sloped && how->order > 2;
     load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
   }
   return load;
@@ -72,12 +73,13 @@ rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, in
 rm_load rm_load_max(rm_load a, rm_load b)
 {
   return (rm_load){a.num_fields > b.num_fields ? a.num_fields : b.num_fields, a.width > b.width ? a.width : b.width,
-                   a.has_slopes || b.has_slopes, a.has_nearest || b.has_nearest};
+                   a.has_slopes || b.has_slopes, a.is_wide || b.is_wide, a.has_nearest || b.has_nearest};
 }
 
 bool rm_load_covers(rm_load a, rm_load b)
 {
-  return a.num_fields >= b.num_fields && a.width >= b.width && a.has_slopes >= b.has_slopes && a.has_nearest >= b.has_nearest;
+  return a.num_fields >= b.num_fields && a.width >= b.width && a.has_slopes >= b.has_slopes && a.is_wide >= b.is_wide &&
+         a.has_nearest >= b.has_nearest;
 }
 
 static void lay_out(rm_carrier *c, int num_fields)
@@ -89,9 +91,9 @@ static void lay_out(rm_carrier *c, int num_fields)
   p->has_bounds = needs_bounds(&c->setup, &c->how, num_fields, c->fields);
   p->width      = 0;
   for (int f = 0; f < num_fields; f++) {
-    p->order[f] = has_slope(&c->how, &c->fields[f]) ? 2 : 1;
+    p->order[f] = has_slope(&c->how, &c->fields[f]) ? c->how.order : 1;
     p->at[f]    = p->width;
-    p->width += p->order[f] == 1 ? 1 : p->has_bounds ? 6 : 4;
+    p->width += rm_pack_width(p->order[f], p->has_bounds);
   }
 }
 
@@ -99,8 +101,11 @@ static void lay_out(rm_carrier *c, int num_fields)
 
 static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
 {
-  for (rm_lid c = 0; c < stencil->num_cells; c++)
+  for (rm_lid c = 0; c < stencil->num_cells; c++) {
     for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++) needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
+    for (int64_t k = stencil->wide_offset ? stencil->wide_offset[c] : 0; stencil->wide_offset && k < stencil->wide_offset[c + 1]; k++)
+      needs_halo[c] |= stencil->wide_neighbour[k] >= stencil->num_cells;
+  }
 }
 
 /* All memory that transfers need. Not collective. */
@@ -114,7 +119,7 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->given, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(c->pack, arena, rm_mul_sat(setup->giving->num_cells, c->load.width));
   RM_NEW(c->value, arena, rm_mul_sat(setup->receiving->num_cells, n));
-  RM_NEW(c->limited, arena, n);
+  RM_NEW(c->limited, arena, 2 * (int64_t)n);
   RM_NEW(c->integral, arena, n);
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->fields, arena, n);
@@ -268,7 +273,7 @@ static void note(rm_carrier *c, remap_status status)
 static void reconstruct(rm_carrier *c, uint8_t which)
 {
   rm_reconstruct(&c->setup, &c->packing, c->given, (const double *)(const void *)c->halo.received, c->needs_halo, which, c->pack,
-                 c->limited);
+                 c->limited, c->limited + c->packing.num_fields);
 }
 
 /* Does this transfer read the halo? */
@@ -296,7 +301,7 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   c->mine         = mine;
   c->reason       = *reason;
   for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
-  for (int f = 0; f < num_fields; f++) c->limited[f] = 0;
+  for (int f = 0; f < 2 * num_fields; f++) c->limited[f] = 0;
   lay_out(c, num_fields);
   for (int f = 0; f < num_fields; f++) {
     if (c->note.status == REMAP_OK) note(c, gather_given(c, f, &c->reason));
@@ -389,7 +394,7 @@ static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report 
   rm_integral_source(setup, c->fields, &c->packing, c->given, c->pack, c->integral);
   RM_TRY(rm_comm_min_f64(setup->comm, least, 2 * n));
   RM_TRY(rm_comm_max_f64(setup->comm, greatest, 2 * n));
-  RM_TRY(rm_comm_sum_i64(setup->comm, c->limited, n));
+  RM_TRY(rm_comm_sum_i64(setup->comm, c->limited, 2 * n));
   RM_TRY(rm_integral_report(scratch, setup, n, c->integral, reports));
   for (int f = 0; f < n; f++) {
     const double *low = least + 2 * f, *high = greatest + 2 * f;
@@ -400,6 +405,7 @@ static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report 
     reports[f].target_min    = low[1] <= high[1] ? low[1] : 0.0;
     reports[f].target_max    = low[1] <= high[1] ? high[1] : 0.0;
     reports[f].limited_cells = c->limited[f];
+    reports[f].order_reduced_cells = c->limited[n + f];
   }
   return REMAP_OK;
 }

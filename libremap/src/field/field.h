@@ -19,6 +19,14 @@ typedef struct rm_stencil {
   const rm_lid  *node;              /* [node_offset[num_cells]] of the mesh                                  */
   rm_lid         num_halo;
   const rm_plan *plan;              /* brings the halo's values: received item k is halo cell k              */
+
+  /* Of a widened stencil, else NULL: least squares for quadratic polynomials g.y + sum of h (y y^T - spread), y = x - c, with
+   * zero mean over the cell; coefficients are sums of weight (u_neighbour - u_cell), exact for quadratic fields. */
+  const int64_t *wide_offset;       /* [num_cells + 1]                                                       */
+  const rm_lid  *wide_neighbour;    /* [wide_offset[num_cells]] canonical order; vertex neighbours and, if they do not do, theirs */
+  const double (*wide_weight)[9];   /* [same] of g, then of h: xx, yy, zz, xy, xz, yz                         */
+  const double (*spread)[6];        /* [num_cells] mean of (x - c)(x - c)^T                                  */
+  const uint8_t *is_reduced;        /* [num_cells] 1: no polynomial is determined well: order 2 there        */
 } rm_stencil;
 
 /* takes_part [num_cells]: 0 for cells that are nobody's neighbour; NULL: all are. Collective. Lives in arena. */
@@ -32,6 +40,11 @@ typedef struct rm_layout {
   const int64_t *place;        /* [num_cells] place in its array, NULL: the number within what the array is of  */
 } rm_layout;
 
+/* A stencil for order 3 as well: near with more neighbours, hence with a halo and a plan of its own; it shares arrays with near.
+ * second: rm_mesh_second of the mesh. Collective. Lives in arena. */
+remap_status rm_stencil_widen(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
+                              const double (*second)[6], const rm_stencil *near, const rm_stencil **out);
+
 /* What a transfer needs; everything is borrowed. */
 typedef struct rm_transfer_setup {
   const rm_comm    *comm;
@@ -39,9 +52,10 @@ typedef struct rm_transfer_setup {
   const rm_mesh    *giving, *receiving;
   const rm_rows    *rows;           /* of the receiving cells                                        */
   const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals  */
-  const rm_stencil *giving_stencil; /* NULL if order 1                                               */
+  const rm_stencil *giving_stencil; /* NULL if order 1; widened if order 3                           */
   const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
   rm_layout         giving_layout, receiving_layout;
+  const double    (*receiving_second)[6]; /* rm_mesh_second; NULL unless order 3 has cells to normalise */
   bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 
@@ -50,6 +64,7 @@ typedef struct rm_load {
   int  num_fields;
   int  width;       /* doubles that travel per giving cell           */
   bool has_slopes;  /* needs the stencil's halo                       */
+  bool is_wide;     /* of the widened stencil, for order 3            */
   bool has_nearest; /* uncovered cells take the nearest mapped cell's */
 } rm_load;
 

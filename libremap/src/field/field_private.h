@@ -23,6 +23,24 @@ typedef struct rm_distance_noise {
  * Not collective. O(n). */
 void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3]);
 
+/* Axes W such that the products W d are orthonormal as columns; their number, the dimension of what the distances span. d is used up; scratch is [n]. Not collective. O(n). */
+int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double axes[3][3]);
+
+/* ---- quadratic ------------------------------------------------------------------------------------------------- */
+
+/* Working memory, [n] each. */
+typedef struct rm_quadratic_room {
+  double (*distance)[3], (*row)[9], *row_weight;
+} rm_quadratic_room;
+
+/* Weights of the nine coefficients of a quadratic polynomial with zero mean over a cell, from distances d_k between n centroids and
+ * the cell's own and differences of mean (x - c)(x - c)^T. False if the neighbours do not determine it well. Not collective. O(n). */
+bool rm_quadratic_weights(int64_t n, const double (*d)[3], const double (*spread)[6], const rm_distance_noise *noise,
+                          rm_quadratic_room *room, double (*weight)[9]);
+
+/* Rows and columns of the six numbers of a symmetric matrix: xx, yy, zz, xy, xz, yz. */
+static const int rm_row_of[6] = {0, 1, 2, 0, 0, 1}, rm_column_of[6] = {0, 1, 2, 1, 2, 2};
+
 /* ---- reconstruct ----------------------------------------------------------------------------------------------- */
 
 /* Sums and slopes are of values times this power of two, so that differences of the largest values and slopes over small cells
@@ -31,21 +49,40 @@ void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *nois
 
 /* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it (at
  * order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own alone); where the field has
- * slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled. */
+ * slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled; at order 3 six
+ * coefficients h of the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
 typedef struct rm_packing {
   int  num_fields, width;
   int *at;         /* [num_fields]                           */
-  int *order;      /* [num_fields] 1 or 2                    */
-  bool has_bounds; /* fields of order 2 carry the bounds     */
+  int *order;      /* [num_fields] 1, 2 or 3                 */
+  bool has_bounds; /* fields of order 2 or 3 carry the bounds */
   bool is_limited; /* Barth-Jespersen                        */
 } rm_packing;
 enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
 
-/* Fill the pack, [giving cells][width], of cells whose needs_halo is `which`; limited [num_fields] grows by the number of cells
- * whose slope was reduced. given is [giving cells][num_fields], halo [halo of the stencil][num_fields], read only for cells that
+/* Place of h after at[f], the constant behind it; and how many places a field takes. */
+static inline int rm_pack_curvature(bool has_bounds) { return has_bounds ? RM_PACK_BOUNDS + 2 : RM_PACK_BOUNDS; }
+static inline int rm_pack_width(int order, bool has_bounds)
+{
+  return order == 1 ? 1 : rm_pack_curvature(has_bounds) + (order > 2 ? 7 : 0);
+}
+
+/* h:(y z^T) with h as six coefficients of a symmetric form. */
+static inline double rm_form(const double h[6], const double y[3], const double z[3])
+{
+  return h[0] * y[0] * z[0] + h[1] * y[1] * z[1] + h[2] * y[2] * z[2] +
+         0.5 * (h[3] * (y[0] * z[1] + y[1] * z[0]) + h[4] * (y[0] * z[2] + y[2] * z[0]) + h[5] * (y[1] * z[2] + y[2] * z[1]));
+}
+static inline double rm_dot6(const double h[6], const double s[6])
+{
+  return h[0] * s[0] + h[1] * s[1] + h[2] * s[2] + h[3] * s[3] + h[4] * s[4] + h[5] * s[5];
+}
+
+/* Fill the pack, [giving cells][width], of cells whose needs_halo is `which`; limited and reduced [num_fields] grow by the number
+ * of cells whose slope was reduced by the limiter, and of those that order 3 has no polynomial for. given is [giving cells][num_fields], halo [halo of the stencil][num_fields], read only for cells that
  * need it. Cells that cover nothing get slope 0. Not collective. */
 void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, const double *given, const double *halo,
-                    const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited);
+                    const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited, int64_t *reduced);
 
 /* ---- nearest --------------------------------------------------------------------------------------------------- */
 

@@ -1,4 +1,4 @@
-/* leastsq -- the weights of a least-squares gradient in one cell.
+/* leastsq -- the weights of a least-squares gradient in one cell, and the axes in which its neighbours spread evenly.
  *
  * Minimise sum over k of (w_k (g.d_k - du_k))^2 with w_k = 1/|d_k|, so that near neighbours count more: on curved layers of thin
  * cells a gradient across the layer survives. The matrix A = (w_k d_k) is factored A = Q R by Gram-Schmidt, every column
@@ -105,9 +105,10 @@ static int row_space(const factors *f, double basis[3][3])
   return num;
 }
 
-/* Row weights 1/|d|, 0 where the distance is rounding only; d becomes w d, without the columns that span nothing. The number of
- * columns left; *noise_length receives the largest length that rounding has in a scaled column. */
-static int weigh_rows(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *row_weight, double *noise_length)
+/* Row weights, 1/|d| or 1, but 0 where the distance is rounding only; d becomes w d, without the columns that span nothing. The
+ * number of columns left; *noise_length receives the largest length that rounding has in a scaled column. */
+static int weigh_rows(int64_t n, double (*d)[3], bool by_distance, const rm_distance_noise *noise, double *row_weight,
+                      double *noise_length)
 {
   double longest[3] = {0.0, 0.0, 0.0}, length2[3] = {0.0, 0.0, 0.0}, sum2 = 0.0;
   int    num = 0;
@@ -118,7 +119,7 @@ static int weigh_rows(int64_t n, double (*d)[3], const rm_distance_noise *noise,
     bool          is_far = false;
 
     for (int c = 0; c < 3; c++) is_far |= fabs(x[c]) > noise->coordinate[c] + 0x1p-40 * noise->extent[c];
-    row_weight[k] = is_far ? 1.0 / length : 0.0;
+    row_weight[k] = is_far ? (by_distance ? 1.0 / length : 1.0) : 0.0;
     sum2 += row_weight[k] * row_weight[k];
     for (int c = 0; c < 3; c++) {
       if (is_far && fabs(x[c]) > longest[c]) longest[c] = fabs(x[c]);
@@ -154,7 +155,7 @@ static void project_rows(int64_t n, double (*a)[3], const factors *f, const doub
 void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3])
 {
   double    noise_length, basis[3][3] = {{0.0}};
-  const int num = weigh_rows(n, d, noise, scratch, &noise_length);
+  const int num = weigh_rows(n, d, true, noise, scratch, &noise_length);
   int       dim = 3;
   factors   f;
 
@@ -174,4 +175,30 @@ void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *nois
       weight[k][c] = scratch[k] * along;
     }
   }
+}
+
+int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double axes[3][3])
+{
+  double    noise_length, basis[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+  const int num = weigh_rows(n, d, false, noise, scratch, &noise_length);
+  factors   f;
+
+  factor(n, d, 3, fmax(INDEPENDENT, noise_length), &f);
+  if (f.rank < num) {
+    const int dim = row_space(&f, basis);
+
+    project_rows(n, d, &f, (const double(*)[3])basis, dim);
+    factor(n, d, dim, 0.0, &f);
+  }
+  for (int p = 0; p < f.rank; p++) { /* Q = A R^-1, column by column */
+    const int c = f.column[p];
+
+    for (int i = 0; i < 3; i++) {
+      double sum = basis[c][i] / f.scale[c];
+
+      for (int q = 0; q < p; q++) sum -= f.r[q][c] * axes[q][i];
+      axes[p][i] = sum / f.r[p][c];
+    }
+  }
+  return f.rank;
 }

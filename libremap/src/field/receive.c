@@ -1,5 +1,5 @@
-/* receive -- what receiving cells make of what giving cells sent: the content of each is the sum over its row of u V + g.M, and
- * its coverage decides what becomes of that. O(pairs) per field. */
+/* receive -- what receiving cells make of what giving cells sent: the content of each is the sum over its row of u V + g.M + h:S,
+ * and its coverage decides what becomes of that. O(pairs) per field. */
 #include "field_private.h"
 
 bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover)
@@ -23,7 +23,7 @@ bool rm_needs_nearest(const remap_transfer *how, const remap_field_desc *field)
 
 /* A row, for one field: sums in row order, the first two with compensation. */
 typedef struct row_sums {
-  double content;   /* of u V + g.M */
+  double content;   /* of u V + g.M + h:S */
   double volume;    /* of V         */
   double magnitude; /* of |V|       */
 } row_sums;
@@ -32,6 +32,7 @@ typedef struct row_sums {
 typedef struct giver_view {
   double        value; /* scaled                                            */
   const double *slope; /* scaled; behind it the bounds, if there are any    */
+  const double *curvature; /* scaled, and its constant; NULL below order 3      */
 } giver_view;
 
 static giver_view view(const rm_receipt *w, int f, rm_lid giver)
@@ -39,7 +40,8 @@ static giver_view view(const rm_receipt *w, int f, rm_lid giver)
   static const double no_slope[3] = {0.0, 0.0, 0.0};
   const double       *place       = w->got + (int64_t)giver * w->packing->width + w->packing->at[f];
 
-  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->order[f] > 1 ? place + RM_PACK_SLOPE : no_slope};
+  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->order[f] > 1 ? place + RM_PACK_SLOPE : no_slope,
+                      w->packing->order[f] > 2 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
 }
 
 static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
@@ -54,6 +56,7 @@ static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
 
     rm_compensated_add(&content, g.value * rows->volume[k]);
     rm_compensated_add(&content, g.slope[0] * m[0] + g.slope[1] * m[1] + g.slope[2] * m[2]);
+    if (g.curvature) rm_compensated_add(&content, rm_dot6(g.curvature, rows->second[k]) + g.curvature[6] * rows->volume[k]);
     rm_compensated_add(&volume, rows->volume[k]);
     magnitude += fabs(rows->volume[k]);
   }
@@ -75,22 +78,31 @@ static double plain_mean(const rm_receipt *w, int f, rm_lid cell, const row_sums
   return sum;
 }
 
-/* The mean over the covered part, each giver's reconstruction taken to the centroid of the whole cell; under a limiter within the
- * bounds of the givers' neighbourhoods. */
+/* The mean of a giver's polynomial over a cell that may lie beyond the giver. */
+static double mean_beyond(const rm_receipt *w, const giver_view *g, const double giver_centroid[3], rm_lid cell)
+{
+  const double *x    = w->setup->receiving->cell_centroid[cell];
+  const double  y[3] = {x[0] - giver_centroid[0], x[1] - giver_centroid[1], x[2] - giver_centroid[2]};
+  const double  mean = g->value + (g->slope[0] * y[0] + g->slope[1] * y[1] + g->slope[2] * y[2]);
+
+  if (!g->curvature) return mean;
+  return mean + (rm_form(g->curvature, y, y) + g->curvature[6] +
+                 rm_dot6(g->curvature, w->setup->receiving_second[cell]) / w->setup->receiving->cell_volume[cell]);
+}
+
+/* The mean over the covered part, each giver's reconstruction taken to the whole cell; under a limiter within the bounds of the
+ * givers' neighbourhoods. */
 static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
 {
   const rm_rows *rows  = w->setup->rows;
-  const double  *x     = w->setup->receiving->cell_centroid[cell];
   rm_compensated sum   = {0.0, 0.0};
   double         least = INFINITY, greatest = -INFINITY, mean;
 
-  if (is_void(s->volume, s)) return plain_mean(w, f, cell, s);
+  if (is_void(s->volume, s) || is_void(w->setup->receiving->cell_volume[cell], s)) return plain_mean(w, f, cell, s);
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const giver_view g    = view(w, f, rows->giver[k]);
-    const double    *c    = rows->giver_centroid[rows->giver[k]];
-    const double     rise = g.slope[0] * (x[0] - c[0]) + g.slope[1] * (x[1] - c[1]) + g.slope[2] * (x[2] - c[2]);
+    const giver_view g = view(w, f, rows->giver[k]);
 
-    rm_compensated_add(&sum, (g.value + rise) * rows->volume[k]);
+    rm_compensated_add(&sum, mean_beyond(w, &g, rows->giver_centroid[rows->giver[k]], cell) * rows->volume[k]);
     if (!w->packing->has_bounds || w->packing->order[f] < 2) continue;
     least    = fmin(least, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE]);
     greatest = fmax(greatest, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE + 1]);

@@ -4,9 +4,12 @@
  *   (i, j, V, M)  ----->   j | i1 i2 i3 ...       serves source to target
  *        \------------->   i | j1 j2 ...          serves target to source, moments about c_j
  *
- * Each pair travels twice, as one record of 96 bytes, in one exchange per direction. A row is put into the canonical order of its
- * givers, so nothing that is summed along it can depend on where the pairs were made. O(p) time and memory for p pairs. */
+ * Each pair travels twice, as one record of 96 bytes, in one exchange per direction; its second moments, where there are any, in
+ * another. A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the pairs
+ * were made. O(p) time and memory for p pairs. */
 #include "mapping.h"
+
+#include <string.h>
 
 /* A pair on its way to the home of its receiving cell. */
 typedef struct pair_record {
@@ -24,7 +27,7 @@ typedef struct rows_draft {
   int64_t *offset;
   rm_lid  *giver;
   double  *volume;
-  double (*moment)[3];
+  double (*moment)[3], (*second)[6]; /* second NULL if there are none */
   uint8_t *same, *cover;
   double (*centroid_error)[3];
   int    *giver_rank;
@@ -33,18 +36,22 @@ typedef struct rows_draft {
   double (*giver_centroid)[3];
 } rows_draft;
 
-/* The pairs of a piece as records, grouped by the home of the receiving cell; offset is [comm->size + 1]. */
+/* The pairs of a piece as records, grouped by the home of the receiving cell, and their second moments in the same order, NULL if
+ * there are none; offset is [comm->size + 1]. */
 static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                               remap_side receiving, int64_t *offset, pair_record **out)
+                               remap_side receiving, int64_t *offset, pair_record **out, double (**out_second)[6])
 {
   const bool      backward = receiving == REMAP_SOURCE;
   const rm_piece *to = &part->piece[receiving], *from = &part->piece[backward ? REMAP_TARGET : REMAP_SOURCE];
   const rm_lid *receiver = backward ? moments->source : moments->target, *giver = backward ? moments->target : moments->source;
   const int     skin = backward ? RM_PAIR_TARGET_SKIN : RM_PAIR_SOURCE_SKIN;
+  const double (*given_second)[6] = backward ? moments->second_back : moments->second;
   pair_record  *record;
   int64_t      *next;
+  double(*second)[6] = NULL;
 
   RM_NEW(record, scratch, moments->num_pairs);
+  if (given_second) RM_NEW(second, scratch, moments->num_pairs);
   RM_NEW(next, scratch, (int64_t)comm->size + 1);
   for (int r = 0; r <= comm->size; r++) offset[r] = 0;
   for (int64_t k = 0; k < moments->num_pairs; k++) offset[to->cell_home_rank[receiver[k]]]++;
@@ -53,7 +60,8 @@ static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_
   for (int64_t k = 0; k < moments->num_pairs; k++) {
     const rm_lid  i = giver[k], j = receiver[k];
     const double *c = from->cell_centroid[i];
-    pair_record  *p = &record[next[to->cell_home_rank[j]]++];
+    const int64_t at = next[to->cell_home_rank[j]]++;
+    pair_record  *p  = &record[at];
 
     *p = (pair_record){.volume         = moments->volume[k],
                        .giver_centroid = {c[0], c[1], c[2]},
@@ -66,12 +74,14 @@ static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_
                        .is_empty       = (moments->flags[k] & RM_PAIR_EMPTY) != 0};
     for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
       p->moment[d] = moments->moment[k][d] + (backward ? (to->cell_centroid[j][d] - c[d]) * p->volume : 0.0);
+    for (int d = 0; d < 6 && second; d++) second[at][d] = given_second[k][d];
   }
-  *out = record;
+  *out        = record;
+  *out_second = second;
   return REMAP_OK;
 }
 
-static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pairs, rows_draft *draft)
+static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pairs, bool has_second, rows_draft *draft)
 {
   RM_NEW0(draft->offset, arena, num_cells + 1);
   RM_NEW0(draft->cover, arena, num_cells);
@@ -79,6 +89,8 @@ static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pai
   RM_NEW(draft->giver, arena, num_pairs);
   RM_NEW(draft->volume, arena, num_pairs);
   RM_NEW(draft->moment, arena, num_pairs);
+  draft->second = NULL;
+  if (has_second) RM_NEW(draft->second, arena, num_pairs);
   RM_NEW0(draft->same, arena, num_pairs);
   return REMAP_OK;
 }
@@ -142,14 +154,16 @@ static remap_status sort_rows(rm_arena *scratch, const rm_frame *frame, int64_t 
   return REMAP_OK;
 }
 
-/* Mark the cells that a skin passes through, and take the records out that are no pairs. Returns how many stay. */
-static int64_t mark_cut(int64_t n, pair_record *record, uint8_t *is_cut)
+/* Mark the cells that a skin passes through, and take the records out that are no pairs, with their second moments. Returns how many stay. */
+static int64_t mark_cut(int64_t n, pair_record *record, double (*second)[6], uint8_t *is_cut)
 {
   int64_t kept = 0;
 
   for (int64_t k = 0; k < n; k++) {
     is_cut[record[k].receiver] |= record[k].is_cut != 0;
-    if (!record[k].is_empty) record[kept++] = record[k];
+    if (record[k].is_empty) continue;
+    if (second) memmove(second[kept], second[k], sizeof *second);
+    record[kept++] = record[k];
   }
   return kept;
 }
@@ -170,9 +184,9 @@ static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_vo
   return rint(rm_compensated_value(&sum) / cell_volume) == 1.0 ? REMAP_COVERED : REMAP_PARTIAL;
 }
 
-/* Rows of one side out of the records that came, which are reordered. What stays to be filled in is `same` and the plan. */
+/* Rows of one side out of the records that came, with their second moments (NULL: none); both are reordered. What stays to be filled in is `same` and the plan. */
 static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame *frame, const rm_mesh *mesh, int64_t n,
-                              pair_record *record, rows_draft *draft, rm_rows *rows, rm_reason *reason)
+                              pair_record *record, double (*second)[6], rows_draft *draft, rm_rows *rows, rm_reason *reason)
 {
   rm_lid  *giver_of_record;
   int64_t *place;
@@ -182,8 +196,8 @@ static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame
     return rm_fail(REMAP_TOO_LARGE, reason, mesh->side, -1, "%lld pairs come to one rank; use more ranks", (long long)n);
   rows->num_cells = mesh->num_cells;
   RM_NEW0(is_cut, scratch, mesh->num_cells);
-  n = mark_cut(n, record, is_cut);
-  RM_TRY(new_rows(arena, mesh->num_cells, n, draft));
+  n = mark_cut(n, record, second, is_cut);
+  RM_TRY(new_rows(arena, mesh->num_cells, n, second != NULL, draft));
   RM_NEW(giver_of_record, scratch, n);
   RM_NEW(place, scratch, n);
   for (int64_t k = 0; k < n; k++) {
@@ -200,6 +214,7 @@ static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame
       draft->giver[k]  = giver_of_record[place[k]];
       draft->volume[k] = p->volume;
       for (int d = 0; d < 3; d++) draft->moment[k][d] = p->moment[d];
+      for (int d = 0; d < 6 && second; d++) draft->second[k][d] = second[place[k]][d];
     }
     if (draft->offset[c] == draft->offset[c + 1]) continue; /* uncovered */
     draft->cover[c] = (uint8_t)cover_of(draft, c, mesh->cell_volume[c], is_cut[c] != 0);
@@ -213,6 +228,7 @@ static void publish(const rows_draft *draft, rm_rows *rows)
   rows->giver          = draft->giver;
   rows->volume         = draft->volume;
   rows->moment         = (const double(*)[3])draft->moment;
+  rows->second         = (const double(*)[6])draft->second;
   rows->same           = draft->same;
   rows->cover          = draft->cover;
   rows->centroid_error = (const double(*)[3])draft->centroid_error;
@@ -231,13 +247,16 @@ static remap_status bring_home(rm_arena *arena, const rm_comm *comm, const rm_fr
   int64_t     *send_offset = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *send_offset) : NULL;
   int64_t     *recv_offset = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *recv_offset) : NULL;
   pair_record *send        = NULL;
-  void        *recv        = NULL;
+  void        *recv = NULL, *recv_second = NULL;
+  double(*send_second)[6]  = NULL;
   remap_status status      = REMAP_NO_MEMORY;
 
-  if (send_offset && recv_offset) status = pack_pairs(scratch, comm, part, moments, mesh->side, send_offset, &send);
+  if (send_offset && recv_offset) status = pack_pairs(scratch, comm, part, moments, mesh->side, send_offset, &send, &send_second);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send, send_offset, send, recv_offset, &recv));
-  status = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, draft, rows, reason);
+  if (moments->second)
+    RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send_second, send_offset, send_second, recv_offset, &recv_second));
+  status = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, recv_second, draft, rows, reason);
   RM_GOTO(done, status = rm_comm_agree_reason(comm, status, reason));
   publish(draft, rows);
   status = rm_plan_build(comm, arena, rows->num_givers, rows->giver_rank, rows->giver_cell, &rows->plan);

@@ -21,6 +21,7 @@ typedef struct rm_rows {
   const rm_lid  *giver;        /* [offset[num_cells]] place in the halo of giving cells                    */
   const double  *volume;       /* [same] V, own frame                                                      */
   const double (*moment)[3];   /* [same] integral of (x - c), c the GIVING cell's centroid                 */
+  const double (*second)[6];   /* [same] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if the moments had none */
   const uint8_t *same;         /* [same]                                                                   */
   const uint8_t *cover;        /* [num_cells] remap_cover; UNWANTED only by rm_mapping_mask                */
   const double (*centroid_error)[3]; /* [num_cells] true centroid less rm_mesh's, by which moments about the latter do not add

@@ -7,7 +7,7 @@ typedef struct draft {
   int64_t *offset;
   rm_lid  *giver;
   double  *volume;
-  double (*moment)[3];
+  double (*moment)[3], (*second)[6]; /* second NULL if there are none */
   uint8_t *same, *cover;
 } draft;
 
@@ -19,6 +19,8 @@ static remap_status make_room(rm_arena *arena, const rm_rows *rows, draft *d)
   RM_NEW(d->giver, arena, n);
   RM_NEW(d->volume, arena, n);
   RM_NEW(d->moment, arena, n);
+  d->second = NULL;
+  if (rows->second) RM_NEW(d->second, arena, n);
   RM_NEW(d->same, arena, n);
   RM_NEW(d->cover, arena, rows->num_cells);
   return REMAP_OK;
@@ -38,6 +40,7 @@ static void filter(const rm_rows *rows, const uint8_t *own, const uint8_t *other
       d->giver[num]  = rows->giver[k];
       d->volume[num] = rows->volume[k];
       for (int i = 0; i < 3; i++) d->moment[num][i] = rows->moment[k][i];
+      for (int i = 0; i < 6 && d->second; i++) d->second[num][i] = rows->second[k][i];
       d->same[num++] = rows->same[k];
     }
     d->offset[c + 1] = num;
@@ -77,6 +80,7 @@ remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapp
     rows->giver  = d[side].giver;
     rows->volume = d[side].volume;
     rows->moment = (const double(*)[3])d[side].moment;
+    rows->second = (const double(*)[6])d[side].second;
     rows->same   = d[side].same;
     rows->cover  = d[side].cover;
     for (rm_lid c = 0; c < rows->num_cells; c++)

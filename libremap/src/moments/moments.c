@@ -307,6 +307,15 @@ static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, 
 
 /* ---- one source cell ------------------------------------------------------------------------------------------------- */
 
+/* The slot's second moments about a point d before its origin, with its first ones m. */
+static void shift_second(const slot *s, const double m[3], const double d[3], double second[6])
+{
+  for (int k = 0; k < 6; k++) {
+    const int x = row_of[k], y = column_of[k];
+    second[k] = s->sum[4 + k] / 120 + (d[x] * m[y] + d[y] * m[x]) + d[x] * d[y] * (s->sum[0] / 6);
+  }
+}
+
 static remap_status push_pair(work *w, rm_lid i, const slot *s, uint8_t flags)
 {
   const double *c = w->part->piece[0].cell_centroid[i];
@@ -325,11 +334,11 @@ static remap_status push_pair(work *w, rm_lid i, const slot *s, uint8_t flags)
   w->flags[n]  = flags;
   for (int k = 0; k < 3; k++) w->moment[n][k] = m[k] + d[k] * v;
   if (w->num_sums == 10) {
+    const double *b = w->part->piece[1].cell_centroid[s->target], e[3] = {s->o[0] - b[0], s->o[1] - b[1], s->o[2] - b[2]};
     RM_TRY(rm_grow(&w->second, &w->room[5], need, sizeof *w->second));
-    for (int k = 0; k < 6; k++) {
-      const int x = row_of[k], y = column_of[k];
-      w->second[n][k] = s->sum[4 + k] / 120 + (d[x] * m[y] + d[y] * m[x]) + d[x] * d[y] * v;
-    }
+    RM_TRY(rm_grow(&w->second_back, &w->room[6], need, sizeof *w->second_back));
+    shift_second(s, m, d, w->second[n]);
+    shift_second(s, m, e, w->second_back[n]);
   }
   w->num_pairs++;
   return REMAP_OK;
@@ -484,7 +493,9 @@ static remap_status keep(rm_arena *arena, const work *w, const rm_moments **out)
   m->moment    = kept(arena, w->moment, place, n, sizeof *w->moment);
   m->flags     = kept(arena, w->flags, place, n, sizeof *w->flags);
   m->second    = w->num_sums == 10 ? kept(arena, w->second, place, n, sizeof *w->second) : NULL;
-  if (!m->source || !m->target || !m->volume || !m->moment || !m->flags || (w->num_sums == 10 && !m->second)) return REMAP_NO_MEMORY;
+  m->second_back = w->num_sums == 10 ? kept(arena, w->second_back, place, n, sizeof *w->second_back) : NULL;
+  if (!m->source || !m->target || !m->volume || !m->moment || !m->flags) return REMAP_NO_MEMORY;
+  if (w->num_sums == 10 && (!m->second || !m->second_back)) return REMAP_NO_MEMORY;
   *out = m;
   return REMAP_OK;
 }
@@ -505,6 +516,7 @@ remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_ove
   free(w.volume);
   free(w.moment);
   free(w.second);
+  free(w.second_back);
   free(w.flags);
   rm_arena_drop(w.scratch);
   return status;

@@ -20,6 +20,7 @@ typedef struct rm_moments {
   const double  *volume;          /* [num_pairs]                                                                       */
   const double (*moment)[3];      /* [num_pairs] integral of (x - c), c the source cell's centroid                     */
   const double (*second)[6];      /* [num_pairs] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if not asked */
+  const double (*second_back)[6]; /* [num_pairs] the same about the target cell's centroid; NULL likewise                */
   const uint8_t *flags;           /* [num_pairs] RM_PAIR_ bits                                                         */
 } rm_moments;
 

@@ -108,9 +108,9 @@ typedef struct work {
   remap_status      status;
   /* the result */
   rm_lid           *source, *target;
-  double           *volume, (*moment)[3], (*second)[6];
+  double           *volume, (*moment)[3], (*second)[6], (*second_back)[6];
   uint8_t          *flags;
-  int64_t           num_pairs, room[6];
+  int64_t           num_pairs, room[7];
 } work;
 
 /* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2 (or in
