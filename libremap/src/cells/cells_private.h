@@ -4,8 +4,9 @@
  *   spots.c     exact signs of vertices that are no nodes of the meshes
  *   polygons.c  the planar graph in every triangle and its polygons
  *   holes.c     polygons with holes, cut into triangles
+ *   arcs.c      edges of polygons, sorted
  *   glue.c      cells: sides of polygons joined around edges
- *   merge.c     pieces of one planar face put together again
+ *   faces.c     pieces of one planar face put together again
  *   cells.c     the product; check.c its invariants */
 #ifndef RM_CELLS_PRIVATE_H
 #define RM_CELLS_PRIVATE_H
@@ -45,8 +46,10 @@ typedef struct rm_limit {
   const rm_lid     *inner_spot[2];   /* vertices of the other mesh inside the triangle                         */
 } rm_limit;
 
-/* Lives in arena. BAD_MESH with the reason where cells overlap. */
-remap_status rm_limit_build(rm_arena *arena, const rm_part *part, const rm_overlay *o, const rm_limit **out, rm_reason *reason);
+/* Lives in arena, but for what only polygons are made from, which lives in passing: crossing_spot, lines, inner. BAD_MESH with the
+ * reason where cells overlap. */
+remap_status rm_limit_build(rm_arena *arena, rm_arena *passing, const rm_part *part, const rm_overlay *o, const rm_limit **out,
+                            rm_reason *reason);
 
 static inline bool rm_is_present(const rm_limit *l, int side, rm_lid t)
 {
@@ -100,42 +103,97 @@ typedef struct rm_label {
   rm_lid cell[2]; /* [side] RM_OUTSIDE */
 } rm_label;
 
-/* A polygon of the supermesh: loop counter-clockwise about the normal of its triangle of mesh 1, or else of mesh 2. */
+/* A polygon of the supermesh: its loop is counter-clockwise about the normal of its own triangle. */
 typedef struct rm_polygon {
-  int64_t  first;
-  rm_lid   num;
-  rm_lid   triangle[2]; /* [side] -1 */
-  rm_label label[2];    /* left, right */
+  int64_t first; /* vertex */
+  rm_lid  own;   /* 2 * triangle + its mesh; mesh 1 if it lies on triangles of both */
+  rm_lid  other; /* cell of the other mesh it lies in, RM_OUTSIDE, or -2 - (2 * triangle + (1 if that faces the other way)) */
 } rm_polygon;
 
 /* malloc'ed; the owner frees both arrays. */
 typedef struct rm_polygons {
-  rm_polygon *polygon;
-  rm_lid     *vertex;
+  rm_polygon *polygon; /* [num + 1] the last one has `first` only, unless there are none */
+  rm_lid     *vertex;  /* [num_vertices] spots */
   int64_t     num, num_vertices, room, vertex_room;
 } rm_polygons;
 
+static inline rm_lid rm_polygon_size(const rm_polygon *g) { return (rm_lid)(g[1].first - g[0].first); }
+
+/* The triangle of mesh `side` it lies on, -1. */
+static inline rm_lid rm_polygon_triangle(const rm_polygon *g, int side)
+{
+  return (g->own & 1) == side ? g->own / 2 : g->other < RM_OUTSIDE ? (-2 - g->other) / 2 : -1;
+}
+
+/* Cells left (h = 0) or right (1) of it. */
+static inline rm_label rm_polygon_label(const rm_limit *l, const rm_polygon *g, int h)
+{
+  const int side = g->own & 1, code = -2 - g->other;
+  rm_label  label;
+
+  label.cell[side]     = l->cell[side][g->own / 2][h];
+  label.cell[1 - side] = g->other < RM_OUTSIDE ? l->cell[1 - side][code / 2][h ^ (code & 1)] : g->other;
+  return label;
+}
+
 /* Every polygon of the supermesh. BAD_MESH if the meshes are not embedded. */
-remap_status rm_polygons_build(rm_arena *scratch, const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason);
+remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason);
 
 /* The region inside loop[0] and outside the others, as triangles: corner gets three spots each, *num their number. Loops are
  * offset[num_loops + 1] into spot; the first runs counter-clockwise, the others clockwise. NO_MEMORY, BAD_MESH. */
 remap_status rm_cut_holes(rm_arena *scratch, const rm_view *view, int num_loops, const int64_t *offset, const rm_lid *spot,
                           rm_lid **corner, int64_t *num);
 
+/* ---- edges of polygons ----------------------------------------------------------------------------------------------- */
+
+/* One polygon's edge. */
+typedef struct rm_arc {
+  rm_lid high;    /* its higher vertex                                        */
+  rm_lid place;   /* of its first vertex in the loop                          */
+  rm_lid polygon; /* 2 * polygon + (1 if that runs from the higher vertex on) */
+} rm_arc;
+
+/* Edges by their lower vertex, then by the higher one, then by polygon. */
+typedef struct rm_arcs {
+  rm_lid         num_vertices;
+  const int64_t *offset; /* [num_vertices + 1] */
+  const rm_arc  *arc;
+} rm_arcs;
+
+/* Lives in arena. Vertices of the polygons are below num_vertices. TOO_LARGE from 2^30 polygons on. O(n), expected. */
+remap_status rm_arcs_build(rm_arena *arena, rm_lid num_vertices, const rm_polygons *p, rm_arcs *out);
+
 /* ---- cells ----------------------------------------------------------------------------------------------------------- */
 
 /* cell[2 k] and cell[2 k + 1] are the cells left and right of polygon k, RM_OUTSIDE; label and volume of each cell. All live in
- * arena. */
+ * arena. BAD_MESH if the polygons around an edge do not bound cells. */
 typedef struct rm_glued {
   rm_lid          num_cells;
   const rm_lid   *cell;
   const rm_label *label;
   const double   *volume;
 } rm_glued;
-remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, rm_glued *out);
+remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, rm_glued *out);
 
-/* Put coplanar pieces of one face between the same two cells together: p shrinks, glued->cell with it. */
-remap_status rm_merge(rm_arena *arena, const rm_limit *l, rm_polygons *p, rm_glued *glued);
+/* Which polygons make one face. Its loop is counter-clockwise about the normal out of the lower cell, RM_OUTSIDE being the highest. */
+typedef struct rm_faces {
+  int64_t        num;    /* groups                                                      */
+  const int64_t *offset; /* [num + 1]                                                   */
+  const rm_lid  *member; /* polygons, ascending; groups ascend by their first one       */
+  const uint8_t *inner;  /* [num_vertices of p] the edge from this place on is no side  */
+  rm_lid        *next;   /* scratch of rm_face_loop, [num_spots]                        */
+} rm_faces;
+
+/* Group coplanar pieces of one face between the same two cells. Lives in arena. */
+remap_status rm_faces_build(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, const rm_glued *glued,
+                            rm_faces *out);
+/* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself nowhere: its
+ * members then are faces as they are. */
+rm_lid rm_face_loop(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t k, rm_lid *loop);
+/* True if polygon k has to be turned so that its normal points out of the lower cell. */
+static inline bool rm_is_turned(const rm_glued *glued, int64_t k)
+{
+  return (uint32_t)glued->cell[2 * k] > (uint32_t)glued->cell[2 * k + 1];
+}
 
 #endif

@@ -1,6 +1,6 @@
 /* check -- tests every invariant of the cells: loops, closed cells, edges of a cell in two of its faces or paired along a contact,
  * volumes. O(n log n). */
-#include "cells/arcs.h"
+#include "cells/cells.h"
 
 #include <math.h>
 #include <stdlib.h>

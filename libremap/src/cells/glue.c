@@ -6,7 +6,6 @@
 
 #include <math.h>
 #include <string.h>
-#include "cells/arcs.h"
 
 enum { MAX_AROUND = 1024 };
 
@@ -14,7 +13,7 @@ typedef struct work {
   rm_arena          *arena, *scratch;
   const rm_limit    *l;
   const rm_polygons *p;
-  rm_arcs            arcs;
+  const rm_arcs     *arcs;
   rm_lid            *parent; /* [2 num polygons] */
 } work;
 
@@ -31,12 +30,15 @@ static void join(work *w, rm_lid a, rm_lid b)
   else w->parent[a] = b;
 }
 
-static inline rm_label label_of(const work *w, rm_lid side) { return w->p->polygon[side / 2].label[side & 1]; }
+static inline rm_label label_of(const work *w, rm_lid side) { return rm_polygon_label(w->l, &w->p->polygon[side / 2], side & 1); }
 static inline bool same_label(rm_label a, rm_label b) { return a.cell[0] == b.cell[0] && a.cell[1] == b.cell[1]; }
 static inline uint64_t label_key(rm_label a) { return (uint64_t)(uint32_t)(a.cell[0] + 1) << 32 | (uint32_t)(a.cell[1] + 1); }
 static inline bool is_outside(rm_label a) { return a.cell[0] == RM_OUTSIDE && a.cell[1] == RM_OUTSIDE; }
 
 /* ---- around an edge -------------------------------------------------------------------------------------------------- */
+
+/* The left (0) or right (1) side of an arc's polygon. */
+static inline rm_lid side_of(const rm_arc *arc, int h) { return (arc->polygon & ~1) + h; }
 
 /* Join the sides that face each other if every label is there twice; false if one is not. */
 static bool join_by_label(work *w, const rm_arc *arc, rm_lid n)
@@ -45,7 +47,7 @@ static bool join_by_label(work *w, const rm_arc *arc, rm_lid n)
   rm_lid   partner[8];
 
   if (n > 4) return false;
-  for (rm_lid k = 0; k < 2 * n; k++) key[k] = label_key(label_of(w, 2 * arc[k / 2].polygon + (k & 1)));
+  for (rm_lid k = 0; k < 2 * n; k++) key[k] = label_key(label_of(w, side_of(&arc[k / 2], k & 1)));
   for (rm_lid k = 0; k < 2 * n; k++) {
     int times = 0;
     for (rm_lid m = 0; m < 2 * n && key[k]; m++)
@@ -53,7 +55,7 @@ static bool join_by_label(work *w, const rm_arc *arc, rm_lid n)
     if (key[k] && times != 1) return false;
   }
   for (rm_lid k = 0; k < 2 * n; k++)
-    if (key[k] && partner[k] > k) join(w, 2 * arc[k / 2].polygon + (k & 1), 2 * arc[partner[k] / 2].polygon + (partner[k] & 1));
+    if (key[k] && partner[k] > k) join(w, side_of(&arc[k / 2], k & 1), side_of(&arc[partner[k] / 2], partner[k] & 1));
   return true;
 }
 
@@ -79,9 +81,9 @@ static bool common_edge(const rm_limit *l, rm_lid p, rm_lid q, const double *lin
 /* A corner of the polygon's triangle on the polygon's side of the line, which runs as the polygon does; NULL if there is none. */
 static const double *corner_of(const work *w, const rm_polygon *g, const double a[3], const double b[3])
 {
-  const int         side = g->triangle[0] >= 0 ? 0 : 1;
+  const int         side = g->own & 1;
   const rm_trimesh *m = w->l->o->mesh[side];
-  const rm_lid     *v = m->triangle[g->triangle[side]];
+  const rm_lid     *v = m->triangle[g->own / 2];
   double            o[3];
 
   rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
@@ -96,9 +98,9 @@ typedef struct spoke {
   rm_lid        arc;
 } spoke;
 
-static remap_status join_by_angle(work *w, const rm_arc *arc, rm_lid n)
+static remap_status join_by_angle(work *w, rm_lid p, const rm_arc *arc, rm_lid n)
 {
-  const rm_lid  p = arc[0].low, q = arc[0].high;
+  const rm_lid  q = arc[0].high;
   const double *line[2];
   spoke         s[MAX_AROUND];
   int           sign = 0;
@@ -109,8 +111,9 @@ static remap_status join_by_angle(work *w, const rm_arc *arc, rm_lid n)
     if (line[0][k] != line[1][k]) sign = rm_compare(w->l, q, p, k) * (line[1][k] > line[0][k] ? 1 : -1);
   const double *a = line[sign > 0 ? 0 : 1], *b = line[sign > 0 ? 1 : 0]; /* a to b as low to high */
   for (rm_lid k = 0; k < n; k++) {
-    spoke  x = {corner_of(w, &w->p->polygon[arc[k].polygon], arc[k].against ? b : a, arc[k].against ? a : b), 0, k};
-    rm_lid i = k;
+    const bool against = arc[k].polygon & 1;
+    spoke      x       = {corner_of(w, &w->p->polygon[arc[k].polygon / 2], against ? b : a, against ? a : b), 0, k};
+    rm_lid     i       = k;
     if (!x.corner) return REMAP_BAD_MESH;
     const int turn = k ? rm_orient3d(a, b, s[0].corner, x.corner) : 1;
     x.quarter      = k == 0 ? -1 : turn > 0 ? 0 : turn == 0 ? 1 : 2;
@@ -123,7 +126,7 @@ static remap_status join_by_angle(work *w, const rm_arc *arc, rm_lid n)
   }
   for (rm_lid k = 0; k < n; k++) {
     const rm_arc *x = &arc[s[k].arc], *y = &arc[s[(k + 1) % n].arc];
-    const rm_lid  front = 2 * x->polygon + !x->against, back = 2 * y->polygon + y->against;
+    const rm_lid  front = side_of(x, !(x->polygon & 1)), back = side_of(y, y->polygon & 1);
     if (!same_label(label_of(w, front), label_of(w, back))) return REMAP_BAD_MESH;
     if (!is_outside(label_of(w, front))) join(w, front, back);
   }
@@ -132,11 +135,12 @@ static remap_status join_by_angle(work *w, const rm_arc *arc, rm_lid n)
 
 static remap_status join_sides(work *w)
 {
-  for (int64_t k = 0, next; k < w->arcs.num; k = next) {
-    const rm_arc *arc = w->arcs.arc + k;
-    for (next = k + 1; next < w->arcs.num && rm_same_arc(&w->arcs.arc[next], arc);) next++;
-    if (!join_by_label(w, arc, (rm_lid)(next - k))) RM_TRY(join_by_angle(w, arc, (rm_lid)(next - k)));
-  }
+  for (rm_lid v = 0; v < w->arcs->num_vertices; v++)
+    for (int64_t k = w->arcs->offset[v], next; k < w->arcs->offset[v + 1]; k = next) {
+      const rm_arc *arc = w->arcs->arc + k;
+      for (next = k + 1; next < w->arcs->offset[v + 1] && w->arcs->arc[next].high == arc->high;) next++;
+      if (!join_by_label(w, arc, (rm_lid)(next - k))) RM_TRY(join_by_angle(w, v, arc, (rm_lid)(next - k)));
+    }
   return REMAP_OK;
 }
 
@@ -151,7 +155,7 @@ static double cone(const work *w, const rm_polygon *g, const double o[3], double
   double        a[3], b[3], c[3], sum = 0;
 
   for (int k = 0; k < 3; k++) a[k] = w->l->xyz[v[0]][k] - o[k], b[k] = w->l->xyz[v[1]][k] - o[k];
-  for (rm_lid i = 2; i < g->num; i++) {
+  for (rm_lid i = 2; i < rm_polygon_size(g); i++) {
     for (int k = 0; k < 3; k++) c[k] = w->l->xyz[v[i]][k] - o[k];
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
     const double reach = noise ? fmax(largest(a), fmax(largest(b), largest(c))) : 0;
@@ -167,7 +171,7 @@ static double solid_angle(const work *w, const rm_polygon *g, const double o[3])
   const rm_lid *v = w->p->vertex + g->first;
   double        d[3][3], r[3], sum = 0;
 
-  for (rm_lid i = 2; i < g->num; i++) {
+  for (rm_lid i = 2; i < rm_polygon_size(g); i++) {
     const rm_lid x[3] = {v[0], v[i - 1], v[i]};
     for (int h = 0; h < 3; h++) {
       for (int k = 0; k < 3; k++) d[h][k] = w->l->xyz[x[h]][k] - o[k];
@@ -203,7 +207,7 @@ static remap_status collect_shells(work *w, shells *s)
   double      *noise;
   bool         any = false;
 
-  RM_NEW(s->of, w->scratch, sides);
+  RM_NEW(s->of, w->arena, sides);
   RM_NEW(s->first_side, w->scratch, sides);
   for (rm_lid k = 0; k < sides; k++) {
     if (is_outside(label_of(w, k))) {
@@ -275,11 +279,10 @@ static remap_status place_voids(work *w, shells *s)
 static remap_status number_cells(work *w, shells *s, rm_glued *out)
 {
   const rm_lid sides = (rm_lid)(2 * w->p->num);
-  rm_lid      *cell, *cell_of;
+  rm_lid      *cell_of;
   rm_label    *label;
   double      *volume;
 
-  RM_NEW(cell, w->arena, sides);
   RM_NEW(cell_of, w->scratch, s->num);
   RM_NEW(label, w->arena, s->num);
   RM_NEW0(volume, w->arena, s->num);
@@ -293,8 +296,8 @@ static remap_status number_cells(work *w, shells *s, rm_glued *out)
     cell_of[k] = cell_of[s->inside[k]];
     volume[cell_of[k]] += s->volume[k];
   }
-  for (rm_lid k = 0; k < sides; k++) cell[k] = s->of[k] < 0 ? RM_OUTSIDE : cell_of[s->of[k]];
-  out->cell   = cell;
+  for (rm_lid k = 0; k < sides; k++) s->of[k] = s->of[k] < 0 ? RM_OUTSIDE : cell_of[s->of[k]];
+  out->cell   = s->of;
   out->label  = label;
   out->volume = volume;
   return REMAP_OK;
@@ -304,8 +307,6 @@ static remap_status glue(work *w, rm_glued *out)
 {
   shells s = {0};
 
-  if (w->p->num > INT32_MAX / 2 - 8) return REMAP_TOO_LARGE;
-  RM_TRY(rm_arcs_build(w->scratch, w->l->num_spots, w->p, &w->arcs));
   RM_NEW(w->parent, w->scratch, 2 * w->p->num);
   for (rm_lid k = 0; k < 2 * w->p->num; k++) w->parent[k] = k;
   RM_TRY(join_sides(w));
@@ -314,9 +315,9 @@ static remap_status glue(work *w, rm_glued *out)
   return number_cells(w, &s, out);
 }
 
-remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, rm_glued *out)
+remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, rm_glued *out)
 {
-  work         w = {.arena = arena, .scratch = rm_arena_new(), .l = l, .p = p};
+  work         w = {.arena = arena, .scratch = rm_arena_new(), .l = l, .p = p, .arcs = arcs};
   remap_status status = w.scratch ? glue(&w, out) : REMAP_NO_MEMORY;
 
   rm_arena_drop(w.scratch);

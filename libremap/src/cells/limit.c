@@ -16,7 +16,7 @@ typedef struct edge_contact {
 } edge_contact;
 
 typedef struct builder {
-  rm_arena      *arena, *scratch;
+  rm_arena      *arena, *passing, *scratch;
   const rm_part *part;
   rm_limit      *l;
   rm_reason     *reason;
@@ -339,7 +339,7 @@ static remap_status crossing_spots(builder *b, int side)
   const rm_lid     *copy  = b->l->first_copy[1 - side];
   rm_lid           *spot;
 
-  RM_NEW(spot, b->arena, trace->num_crossings);
+  RM_NEW(spot, b->passing, trace->num_crossings);
   for (rm_lid e = 0; e < own->num_edges; e++)
     for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) {
       const rm_lid     t = copy[trace->crossing[x].triangle / 2];
@@ -394,7 +394,7 @@ static remap_status file_vertices(builder *b, int side)
   int64_t          *inner_offset;
   rm_lid           *inner, *on_offset, *on, num_inner = 0, num_on = 0;
 
-  RM_NEW0(inner_offset, b->arena, (int64_t)own->num_triangles + 2);
+  RM_NEW0(inner_offset, b->passing, (int64_t)own->num_triangles + 2);
   RM_NEW0(on_offset, b->scratch, (int64_t)own->num_edges + 2);
   for (rm_lid v = 0; v < other->num_vertices; v++) {
     const rm_feature f = b->at[1 - side][v];
@@ -403,7 +403,7 @@ static remap_status file_vertices(builder *b, int side)
   }
   for (rm_lid t = 0; t < own->num_triangles; t++) inner_offset[t + 2] += inner_offset[t + 1];
   for (rm_lid e = 0; e < own->num_edges; e++) on_offset[e + 2] += on_offset[e + 1];
-  RM_NEW(inner, b->arena, num_inner);
+  RM_NEW(inner, b->passing, num_inner);
   RM_NEW(on, b->scratch, num_on);
   for (rm_lid v = 0; v < other->num_vertices; v++) {
     const rm_feature f = b->at[1 - side][v];
@@ -512,14 +512,14 @@ static remap_status lines(builder *b, int side)
   rm_lid           *spot, *state;
   remap_status      status = REMAP_OK;
 
-  RM_NEW(offset, b->arena, (int64_t)m->num_edges + 1);
+  RM_NEW(offset, b->passing, (int64_t)m->num_edges + 1);
   for (rm_lid e = 0; e < m->num_edges && status == REMAP_OK; e++) {
     offset[e] = l.num;
     status    = one_line(b, side, e, &l);
   }
   offset[m->num_edges] = l.num;
-  spot  = rm_arena_alloc(b->arena, l.num, sizeof *spot);
-  state = rm_arena_alloc(b->arena, l.num, sizeof *state);
+  spot  = rm_arena_alloc(b->passing, l.num, sizeof *spot);
+  state = rm_arena_alloc(b->passing, l.num, sizeof *state);
   if (status == REMAP_OK && !(spot && state)) status = REMAP_NO_MEMORY;
   if (status == REMAP_OK && l.num) {
     memcpy(spot, l.spot, sizeof *spot * (size_t)l.num);
@@ -548,9 +548,10 @@ static remap_status build(builder *b)
   return REMAP_OK;
 }
 
-remap_status rm_limit_build(rm_arena *arena, const rm_part *part, const rm_overlay *o, const rm_limit **out, rm_reason *reason)
+remap_status rm_limit_build(rm_arena *arena, rm_arena *passing, const rm_part *part, const rm_overlay *o, const rm_limit **out,
+                            rm_reason *reason)
 {
-  builder      b = {.arena = arena, .scratch = rm_arena_new(), .part = part, .reason = reason};
+  builder      b = {.arena = arena, .passing = passing, .scratch = rm_arena_new(), .part = part, .reason = reason};
   remap_status status = b.scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
   b.l = rm_arena_zero(arena, 1, sizeof *b.l);

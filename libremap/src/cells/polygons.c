@@ -601,21 +601,16 @@ static remap_status push_vertex(rm_polygons *out, rm_lid spot)
   return REMAP_OK;
 }
 
-/* Finish a polygon whose vertices are those from `first` on. */
-static remap_status push_polygon(work *w, int64_t first, rm_lid b, rm_lid state)
+/* Finish a polygon whose vertices are those that came last. */
+static remap_status push_polygon(work *w, rm_lid b, rm_lid state)
 {
-  rm_polygons  *out = w->out;
-  const rm_lid *own = w->l->cell[w->side][w->t];
-  rm_polygon    g   = {first, (rm_lid)(out->num_vertices - first), {-1, -1}, {{{0, 0}}, {{0, 0}}}};
+  rm_polygons *out = w->out;
 
-  g.triangle[w->side]       = w->t;
-  g.triangle[other_side(w)] = b;
-  for (int h = 0; h < 2; h++) {
-    g.label[h].cell[w->side]       = own[h];
-    g.label[h].cell[other_side(w)] = b < 0 ? state : w->l->cell[other_side(w)][b][same_way(w, b) ? h : 1 - h];
-  }
-  RM_TRY(rm_grow(&out->polygon, &out->room, out->num + 1, sizeof *out->polygon));
-  out->polygon[out->num++] = g;
+  RM_TRY(rm_grow(&out->polygon, &out->room, out->num + 2, sizeof *out->polygon));
+  if (out->num == 0) out->polygon[0].first = 0;
+  out->polygon[out->num].own   = 2 * w->t + w->side;
+  out->polygon[out->num].other = b < 0 ? state : -2 - (2 * b + !same_way(w, b));
+  out->polygon[++out->num].first = out->num_vertices;
   return REMAP_OK;
 }
 
@@ -650,9 +645,8 @@ static remap_status push_cut(work *w, rm_lid around, rm_lid b, rm_lid state)
     if (status == REMAP_BAD_MESH) status = tangled(w);
   }
   for (int64_t k = 0; k < num && status == REMAP_OK; k++) {
-    const int64_t first = w->out->num_vertices;
     for (int h = 0; h < 3 && status == REMAP_OK; h++) status = push_vertex(w->out, corner[3 * k + h]);
-    if (status == REMAP_OK) status = push_polygon(w, first, b, state);
+    if (status == REMAP_OK) status = push_polygon(w, b, state);
   }
   free(loops.vertex);
   return status;
@@ -684,9 +678,8 @@ static remap_status one_triangle(work *w)
       status = push_cut(w, k, b, state);
       continue;
     }
-    const int64_t first = w->out->num_vertices;
     RM_TRY(push_loop(w, c, w->out));
-    status = push_polygon(w, first, b, state);
+    status = push_polygon(w, b, state);
   }
   for (rm_lid k = 0; k < w->num_nodes; k++) w->node_of[w->spot[k]] = NOT_CALLED;
   return status;
@@ -703,10 +696,20 @@ static remap_status all_triangles(work *w)
   return REMAP_OK;
 }
 
-remap_status rm_polygons_build(rm_arena *scratch, const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason)
+/* Give back what the arrays have grown too far. */
+static void trim(rm_polygons *out)
 {
-  work               w = {.scratch = scratch, .part = part, .l = l, .reason = reason, .out = out};
-  const remap_status status = all_triangles(&w);
+  void *polygon = realloc(out->polygon, sizeof *out->polygon * ((size_t)out->num + 1));
+  void *vertex  = realloc(out->vertex, sizeof *out->vertex * ((size_t)out->num_vertices + 1));
+
+  if (polygon) out->polygon = polygon;
+  if (vertex) out->vertex = vertex;
+}
+
+remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason)
+{
+  work         w      = {.scratch = rm_arena_new(), .part = part, .l = l, .reason = reason, .out = out};
+  remap_status status = w.scratch ? all_triangles(&w) : REMAP_NO_MEMORY;
 
   free(w.spot);
   free(w.degree_offset);
@@ -716,5 +719,7 @@ remap_status rm_polygons_build(rm_arena *scratch, const rm_part *part, const rm_
   free(w.arc);
   free(w.cycle);
   free(w.touch);
+  rm_arena_drop(w.scratch);
+  trim(out);
   return status;
 }
