@@ -1,0 +1,151 @@
+/* The bits of one rank on any number of ranks: pairs, fields, reports and statistics, for partitions and numberings by lot, with the
+ * caller's global ids and without, masked and moved. */
+#include <remap/remap.h>
+#include "meshes.h"
+#include "rt.h"
+
+typedef struct world {
+  remap_context *ctx;
+  tm_mesh       *mine[2];
+} world;
+
+static tm_mesh *make(int side, uint64_t seed)
+{
+  static const double away[12] = {1, 0, 0, .25, 0, 1, 0, .2, 0, 0, 1, .3};
+  const tm_warping    warp     = {.03, .1 * (double)seed};
+  tm_mesh            *m;
+
+  switch ((seed + (uint64_t)side) % 4) {
+    case 0: m = tm_tetrahedra((int[]){3, 3, 3}, tm_warp, &warp); break;
+    case 1: m = tm_refined((int[]){3, 4, 3}, tm_checkered, tm_warp, &warp); break;
+    case 2: m = tm_dual((int[]){3, 3, 4}, tm_warp, &warp); break;
+    default: m = tm_hexahedra((int[]){5, 4, 6}, NULL, NULL); break; /* aligned with nothing, coplanar with itself */
+  }
+  if (side) tm_move(m, tm_affine, away);
+  return m;
+}
+
+static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids)
+{
+  static const double turned[12] = {.96, -.28, 0, .1, .28, .96, 0, -.1, 0, 0, 1, .05};
+  const remap_motion  motion[2]  = {{NULL, NULL}, {NULL, turned}};
+  uint8_t            *gives[2], *wants[2];
+  int                 rank, size;
+
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  RT_EQ(remap_create(comm, NULL, &w->ctx), REMAP_OK);
+  for (int side = 0; side < 2; side++) {
+    tm_mesh *whole = make(side, seed);
+    int     *deal  = tm_deal(whole, size, seed % 3 ? TM_RANDOM : TM_SLABS, seed);
+
+    w->mine[side] = tm_part(whole, deal, rank, size > 1 ? seed : 0);
+    if (!has_ids) w->mine[side]->view.cell_global = NULL;
+    RT_EQ(remap_set_mesh(w->ctx, side, &w->mine[side]->view), REMAP_OK);
+    gives[side] = tm_alloc_(w->mine[side]->view.num_cells, 1), wants[side] = tm_alloc_(w->mine[side]->view.num_cells, 1);
+    for (int64_t c = 0; c < w->mine[side]->view.num_cells; c++) {
+      gives[side][c] = w->mine[side]->global[c] % 7 != 1;
+      wants[side][c] = w->mine[side]->global[c] % 5 != 2;
+    }
+    tm_free(whole), free(deal);
+  }
+  RT_EQ(remap_build(w->ctx), REMAP_OK);
+  if (seed % 2) RT_EQ(remap_move(w->ctx, motion), REMAP_OK);
+  if (seed % 3 == 1) {
+    const remap_masks masks = {{gives[0], gives[1]}, {wants[0], wants[1]}};
+    RT_EQ(remap_set_masks(w->ctx, &masks), REMAP_OK);
+  }
+  for (int side = 0; side < 2; side++) free(gives[side]), free(wants[side]);
+}
+
+static void close_world(world *w)
+{
+  remap_destroy(&w->ctx);
+  for (int side = 0; side < 2; side++) tm_free(w->mine[side]);
+}
+
+/* Order 1 and 2, limited and not, in one direction: values by the cells' ids in the whole mesh. */
+enum { WAYS = 3 };
+static void transfer(world *w, int d, double *by_id, int64_t num_ids, remap_field_report report[WAYS][2])
+{
+  const tm_mesh *give = w->mine[d], *take = w->mine[1 - d];
+  double        *u[2], *v[2];
+
+  for (int k = 0; k < 2; k++) {
+    u[k] = tm_alloc_(give->view.num_cells, sizeof(double)), v[k] = tm_alloc_(take->view.num_cells, sizeof(double));
+    for (int64_t c = 0; c < give->view.num_cells; c++)
+      u[k][c] = ldexp((double)(tm_mix_((uint64_t)give->global[c] + (uint64_t)k) % 100000) - 5e4, k ? 300 : -20);
+  }
+  for (int way = 0; way < WAYS; way++) {
+    const remap_field_desc f[2] = {{.nature = REMAP_CONSERVED, .in = u[0], .out = v[0]}, {.nature = REMAP_CONSERVED, .in = u[1], .out = v[1]}};
+    remap_transfer         how;
+
+    remap_transfer_default(&how);
+    how.order        = way ? 2 : 1;
+    how.limiter      = way == 1 ? REMAP_LIMITER_NONE : REMAP_LIMITER_BARTH_JESPERSEN;
+    how.on_uncovered = REMAP_UNCOVERED_NEAREST;
+    RT_EQ(remap_field(w->ctx, d, &how, 2, f, report[way]), REMAP_OK);
+    for (int64_t c = 0; c < take->view.num_cells; c++)
+      for (int k = 0; k < 2; k++) by_id[(2 * way + k) * num_ids + take->global[c]] = v[k][c];
+  }
+  for (int k = 0; k < 2; k++) free(u[k]), free(v[k]);
+}
+
+/* Volumes and moments of a cell's pairs in one number: their order is canonical, so they may be added up. */
+static void sum_rows(world *w, int d, double *by_id)
+{
+  remap_pairs_view p;
+
+  RT_EQ(remap_pairs(w->ctx, d, &p), REMAP_OK);
+  for (int64_t c = 0; c < p.num_rows; c++) {
+    double sum = 0;
+    for (int64_t k = p.row_offset[c]; k < p.row_offset[c + 1]; k++)
+      sum = 3 * sum + p.volume[k] + 5 * p.moment[3 * k] + 7 * p.moment[3 * k + 1] + 11 * p.moment[3 * k + 2];
+    by_id[w->mine[1 - d]->global[c]] = sum;
+  }
+}
+
+static void look(uint64_t seed, bool has_ids)
+{
+  world       alone, together;
+  remap_stats s[2];
+
+  open_world(&alone, MPI_COMM_SELF, seed, true);
+  open_world(&together, MPI_COMM_WORLD, seed, has_ids);
+  RT_EQ(remap_get_stats(alone.ctx, &s[0]), REMAP_OK);
+  RT_EQ(remap_get_stats(together.ctx, &s[1]), REMAP_OK);
+  RT_CHECK(s[0].pairs > 0 && s[0].pairs == s[1].pairs);
+  RT_NEAR(s[0].overlap_volume, s[1].overlap_volume, 0.0);
+  for (int side = 0; side < 2; side++) RT_NEAR(s[0].max_closure_error[side], s[1].max_closure_error[side], 0.0);
+  for (int d = 0; d < 2; d++) {
+    const int64_t      n = s[0].cells[1 - d];
+    double            *want = tm_alloc_((2 * WAYS + 1) * n, sizeof *want), *got = tm_alloc_((2 * WAYS + 1) * n, sizeof *got);
+    remap_field_report report[2][WAYS][2];
+
+    memset(report, 0, sizeof report);
+    transfer(&alone, d, want, n, report[0]), sum_rows(&alone, d, want + 2 * WAYS * n);
+    transfer(&together, d, got, n, report[1]), sum_rows(&together, d, got + 2 * WAYS * n);
+    RT_CHECK(memcmp(report[0], report[1], sizeof report[0]) == 0);
+    for (int k = 0; k <= 2 * WAYS; k++)
+      for (int64_t c = 0; c < together.mine[1 - d]->view.num_cells; c++) {
+        const int64_t g = k * n + together.mine[1 - d]->global[c];
+        if (!RT_CHECK(memcmp(&want[g], &got[g], sizeof *got) == 0)) {
+          printf("# seed %d, direction %d, list %d: %.17g and %.17g\n", (int)seed, d, k, want[g], got[g]);
+          break;
+        }
+      }
+    free(want), free(got);
+  }
+  close_world(&alone), close_world(&together);
+}
+
+static void everything_has_the_bits_of_one_rank_with_ids(void)
+{
+  for (uint64_t seed = 1; seed <= 6; seed++) look(seed, true);
+}
+static void everything_has_the_bits_of_one_rank_without_ids(void)
+{
+  for (uint64_t seed = 7; seed <= 12; seed++) look(seed, false);
+}
+
+RT_MAIN(RT_CASE(everything_has_the_bits_of_one_rank_with_ids), RT_CASE(everything_has_the_bits_of_one_rank_without_ids))
