@@ -148,13 +148,14 @@ remap_status remap_build(remap_context *ctx)
 {
   static const bool both[2] = {true, true};
   rm_reason         reason  = {-1, -1, ""};
-  remap_status      status;
+  remap_status      status  = REMAP_OK;
 
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
-  if (rm_context_is_busy(ctx)) {
+  if (rm_context_is_busy(ctx))
     status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
-  } else {
+  status = stage(ctx, status, &reason);
+  if (status == REMAP_OK) {
     for (int side = 0; side < 2; side++) ctx->is_turned[side] = false;
     status = build_anew(ctx, both, &reason);
   }
