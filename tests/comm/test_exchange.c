@@ -146,6 +146,47 @@ static void a_plan_brings_what_each_rank_wants_again_and_again(void)
   rm_comm_free(&comm);
 }
 
+/* Two flows under way at once, of runs of several sizes; the last rank's status reaches whoever hears from it. */
+static void flows_bring_items_and_the_worst_status_of_their_senders(void)
+{
+  rm_comm comm = world();
+
+  for (int64_t chunk = 1; chunk < 1000; chunk *= 7) {
+    rm_arena      *arena = rm_arena_new();
+    int           *rank  = rm_arena_alloc(arena, comm.size * 40, sizeof *rank);
+    rm_lid        *item  = rm_arena_alloc(arena, comm.size * 40, sizeof *item);
+    const int64_t  n     = wants(&comm, 2, 40, rank, item);
+    const rm_plan *plan  = NULL;
+    rm_flow        flow[2];
+    double         mine[2][50];
+
+    RT_EQ(rm_plan_build(&comm, arena, n, rank, item, &plan), REMAP_OK);
+    for (int f = 0; f < 2; f++) RT_EQ(rm_flow_init_chunked(arena, chunk, plan, sizeof *mine[f], &flow[f]), REMAP_OK);
+    for (int run = 0; run < 3; run++) {
+      const remap_status said    = run == 1 && comm.rank == comm.size - 1 ? REMAP_COVERAGE : REMAP_OK;
+      rm_note            note[2] = {{7, said}, {run == 2 ? (uint64_t)comm.rank : 7, said}};
+      bool               hears   = false;
+      int                others  = 0;
+
+      for (int f = 0; f < 2; f++) {
+        for (int k = 0; k < 50; k++) mine[f][k] = 1000 * comm.rank + 100 * f + k;
+        RT_EQ(rm_flow_post(&comm, &flow[f], sizeof **mine, mine[f], note[f]), REMAP_OK);
+        memset(mine[f], 0, sizeof mine[f]); /* on their way */
+      }
+      for (int64_t k = 0; k < n; k++) hears |= rank[k] == comm.size - 1, others += rank[k] != comm.rank;
+      for (int f = 0; f < 2; f++) {
+        const double *got = (const double *)(const void *)flow[f].received;
+
+        RT_EQ(rm_flow_wait(&comm, &flow[f], &note[f]), run == 2 && f == 1 && others ? REMAP_BAD_ARGUMENT : REMAP_OK);
+        for (int64_t k = 0; k < n; k++) RT_NEAR(got[k], 1000 * rank[k] + 100 * f + item[k], 0.0);
+        RT_EQ(note[f].status, run == 1 && hears ? REMAP_COVERAGE : said);
+      }
+    }
+    rm_arena_drop(arena);
+  }
+  rm_comm_free(&comm);
+}
+
 static void only_neighbours_take_part_in_a_plan(void)
 {
   rm_comm        comm  = world();
@@ -194,5 +235,6 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
 
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
         RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
-        RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again), RT_CASE(only_neighbours_take_part_in_a_plan),
+        RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
+        RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders), RT_CASE(only_neighbours_take_part_in_a_plan),
         RT_CASE(a_rank_without_memory_stops_a_plan_everywhere))

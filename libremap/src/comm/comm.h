@@ -68,6 +68,7 @@ typedef struct rm_flow {
   const rm_plan *plan;
   size_t         most;     /* bytes per item that there is room for                                        */
   size_t         size;     /* bytes per item of the run under way                                          */
+  int64_t        chunk;    /* bytes of one message to MPI at most                                          */
   char          *sent;     /* messages to others side by side, each a note and items                       */
   char          *arrived;  /* messages from others likewise                                                */
   char          *received; /* [plan->recv_offset[plan->num_recv]] items of the last run, in the plan's order */

@@ -7,20 +7,22 @@
 enum { TAG_FLOW = 3 };
 
 /* Chunks of a message of `items` items of at most `size` bytes. */
-static int64_t num_chunks(int64_t items, size_t size)
+static int64_t num_chunks(int64_t items, size_t size, int64_t chunk)
 {
-  return (rm_add_sat(rm_mul_sat(items, (int64_t)size), sizeof(rm_note)) - 1) / RM_COMM_CHUNK + 1;
+  return (rm_add_sat(rm_mul_sat(items, (int64_t)size), sizeof(rm_note)) - 1) / chunk + 1;
 }
 
-remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_flow *out)
+remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, size_t most, rm_flow *out)
 {
   const int64_t notes  = (int64_t)sizeof(rm_note);
   const int64_t to_all = plan->send_offset[plan->num_send], from_all = plan->recv_offset[plan->num_recv];
   int64_t       num_requests = 0;
-  rm_flow       flow         = {.plan = plan, .most = most};
+  rm_flow       flow         = {.plan = plan, .most = most, .chunk = chunk};
 
-  for (int i = 0; i < plan->num_send; i++) num_requests += num_chunks(plan->send_offset[i + 1] - plan->send_offset[i], most);
-  for (int i = 0; i < plan->num_recv; i++) num_requests += num_chunks(plan->recv_offset[i + 1] - plan->recv_offset[i], most);
+  for (int i = 0; i < plan->num_send; i++)
+    num_requests += num_chunks(plan->send_offset[i + 1] - plan->send_offset[i], most, chunk);
+  for (int i = 0; i < plan->num_recv; i++)
+    num_requests += num_chunks(plan->recv_offset[i + 1] - plan->recv_offset[i], most, chunk);
   RM_NEW(flow.sent, arena, rm_add_sat(rm_mul_sat(to_all, (int64_t)most), notes * plan->num_send));
   RM_NEW(flow.arrived, arena, rm_add_sat(rm_mul_sat(from_all, (int64_t)most), notes * plan->num_recv));
   RM_NEW(flow.received, arena, rm_mul_sat(from_all, (int64_t)most));
@@ -29,8 +31,16 @@ remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_
   return REMAP_OK;
 }
 
+remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_flow *out)
+{
+  return rm_flow_init_chunked(arena, RM_COMM_CHUNK, plan, most, out);
+}
+
 /* Where the message of neighbour i starts among those side by side. */
-static int64_t start_of(const int64_t *offset, int i, size_t size) { return offset[i] * (int64_t)size + i * (int64_t)sizeof(rm_note); }
+static int64_t start_of(const int64_t *offset, int i, size_t size)
+{
+  return offset[i] * (int64_t)size + i * (int64_t)sizeof(rm_note);
+}
 
 /* Items wanted by neighbour i of a plan, one after the other. */
 static void gather(const rm_plan *plan, int i, size_t size, const char *item, char *to)
@@ -46,8 +56,8 @@ static void gather(const rm_plan *plan, int i, size_t size, const char *item, ch
 /* Post one message, chunk by chunk. */
 static remap_status post(const rm_comm *comm, rm_flow *flow, bool is_send, int rank, char *at, int64_t bytes)
 {
-  for (int64_t done = 0; done < bytes; done += RM_COMM_CHUNK) {
-    const int    n       = (int)(bytes - done < RM_COMM_CHUNK ? bytes - done : RM_COMM_CHUNK);
+  for (int64_t done = 0; done < bytes; done += flow->chunk) {
+    const int    n       = (int)(bytes - done < flow->chunk ? bytes - done : flow->chunk);
     MPI_Request *request = &flow->request[flow->num_requests];
 
     RM_TRY(rm_comm_status(is_send ? MPI_Isend(at + done, n, MPI_BYTE, rank, TAG_FLOW, comm->mpi, request)
@@ -74,7 +84,8 @@ remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const
   for (int i = 0; i < plan->num_recv; i++) {
     const int64_t first = start_of(plan->recv_offset, i, size), end = start_of(plan->recv_offset, i + 1, size);
 
-    if (plan->recv_rank[i] != comm->rank) RM_TRY(post(comm, flow, false, plan->recv_rank[i], flow->arrived + first, end - first));
+    if (plan->recv_rank[i] != comm->rank)
+      RM_TRY(post(comm, flow, false, plan->recv_rank[i], flow->arrived + first, end - first));
   }
   for (int i = 0; i < plan->num_send; i++) {
     const int64_t first = start_of(plan->send_offset, i, size), end = start_of(plan->send_offset, i + 1, size);
