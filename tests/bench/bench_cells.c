@@ -2,7 +2,9 @@
  * hexahedra of DESIGN section 6: mesh 1 is N^3, rotated by 0.3 about z and x and scaled by SCALE, mesh 2 is NB^3. ANGLE 0 with
  * SCALE 1 and PHASE as of mesh 2, 0.1, gives identical meshes where N is NB. One JSON line.
  *
- *   bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]] */
+ *   bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]]
+ *   bench_cells spheres LEVEL OFFSET [REPEATS]    two closed surfaces of 20 4^LEVEL triangles each, one moved by OFFSET radii
+ *   bench_cells cut LEVEL [REPEATS]               one such surface in a grid of 32 x 40 x 23 boxes */
 #include <stdio.h>
 #include <sys/resource.h>
 #include <time.h>
@@ -23,18 +25,89 @@ static double peak_bytes(void)
   return 1024.0 * (double)use.ru_maxrss;
 }
 
-int main(int argc, char **argv)
-{
-  if (argc < 5) return fprintf(stderr, "usage: bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]]\n"), 2;
-  const int         repeats = argc > 5 ? atoi(argv[5]) : 1;
-  const remap_faces faces   = strcmp(argv[4], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE;
-  tm_mesh          *source  = tm_benchmark(atoi(argv[1]), argc > 7 ? atof(argv[7]) : 0.7, argc > 6 ? atof(argv[6]) : 0.3, atof(argv[3]));
-  tm_mesh          *target  = tm_benchmark(atoi(argv[2]), 0.1, 0, 1);
-  laid             *l       = laid_over(source, target, faces, NULL);
-  double            overlay = INFINITY, build = INFINITY;
-  const double      before  = peak_bytes();
+/* ---- closed surfaces ------------------------------------------------------------------------------------------------------- */
 
-  if (l->status != REMAP_OK) return fprintf(stderr, "%s\n", l->reason.text), 1;
+typedef struct soup {
+  tm_mesh *mesh;
+  int64_t  num;
+  double   shift;
+} soup;
+
+static void midpoint(const double a[3], const double b[3], double out[3])
+{
+  double length = 0;
+
+  for (int c = 0; c < 3; c++) out[c] = a[c] + b[c], length += out[c] * out[c];
+  for (int c = 0; c < 3; c++) out[c] /= sqrt(length);
+}
+
+static void divide(soup *s, int level, const double a[3], const double b[3], const double c[3])
+{
+  double ab[3], bc[3], ca[3];
+
+  if (level == 0) {
+    const double *p[3] = {a, b, c};
+    for (int h = 0; h < 3; h++) {
+      for (int d = 0; d < 3; d++) s->mesh->xyz[9 * s->num + 3 * h + d] = .4 * p[h][d] + s->shift * (d + 1) / 3;
+      s->mesh->face_node[3 * s->num + h] = 3 * s->num + h;
+    }
+    s->mesh->face_offset[s->num + 1] = 3 * (s->num + 1);
+    s->mesh->owner[s->num]           = 0;
+    s->mesh->neighbour[s->num++]     = -1;
+    return;
+  }
+  midpoint(a, b, ab), midpoint(b, c, bc), midpoint(c, a, ca);
+  divide(s, level - 1, a, ab, ca);
+  divide(s, level - 1, b, bc, ab);
+  divide(s, level - 1, c, ca, bc);
+  divide(s, level - 1, ab, bc, ca);
+}
+
+/* A sphere of radius 0.4 as one cell: an icosahedron, divided. */
+static tm_mesh *sphere(int level, double shift)
+{
+  static const int face[20][3] = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                                  {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
+                                  {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  const int64_t    n = 20 * ((int64_t)1 << 2 * level);
+  const double     g = (1 + sqrt(5)) / 2, l = sqrt(1 + g * g), x = 1 / l, y = g / l;
+  const double     corner[12][3] = {{-x, y, 0}, {x, y, 0}, {-x, -y, 0}, {x, -y, 0}, {0, -x, y}, {0, x, y},
+                                    {0, -x, -y}, {0, x, -y}, {y, 0, -x}, {y, 0, x}, {-y, 0, -x}, {-y, 0, x}};
+  soup             s = {tm_new_(3 * n, n, 3 * n, 1), 0, shift};
+
+  for (int f = 0; f < 20; f++) divide(&s, level, corner[face[f][0]], corner[face[f][1]], corner[face[f][2]]);
+  return s.mesh;
+}
+
+static void box_of_grid(double xyz[3], const void *data)
+{
+  (void)data;
+  for (int c = 0; c < 3; c++) xyz[c] = 1.1 * xyz[c] - .55;
+}
+
+/* Pieces of both meshes, triangulated: laid_over without the overlay. */
+static laid *lay(const tm_mesh *source, const tm_mesh *target, remap_faces faces)
+{
+  static const laid_how plain = {{NULL, NULL}, 0, 0, 0};
+  const tm_mesh *const  whole[2] = {source, target};
+  laid                 *l = tm_alloc_(1, sizeof *l);
+
+  l->arena = rm_arena_new();
+  l->frame = laid_frame_(whole);
+  for (int side = 0; side < 2 && l->status == REMAP_OK; side++) {
+    laid_piece_(l, whole[side], side, &plain);
+    l->status = rm_trimesh_build(l->arena, &l->frame, &l->part.piece[side], faces, &l->mesh[side]);
+  }
+  return l;
+}
+
+static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces faces, int repeats)
+{
+  laid        *l       = lay(source, target, faces);
+  double       overlay = INFINITY, build = INFINITY;
+  const double before  = peak_bytes();
+
+  if (l->status != REMAP_OK) fprintf(stderr, "%s\n", l->reason.text), exit(1);
   for (int r = 0; r < repeats; r++) {
     rm_arena         *arena = rm_arena_new();
     const rm_overlay *o     = NULL;
@@ -45,19 +118,37 @@ int main(int argc, char **argv)
 
     if (status == REMAP_OK) status = rm_cells_build(arena, &l->part, o, RM_CELLS_UNION, &cells, &l->reason);
     const double t2 = cpu_seconds();
-    if (status != REMAP_OK) return fprintf(stderr, "%d %s\n", (int)status, l->reason.text), 1;
+    if (status != REMAP_OK) fprintf(stderr, "%d %s\n", (int)status, l->reason.text), exit(1);
     overlay = fmin(overlay, t1 - t0);
     build   = fmin(build, t2 - t1);
     if (r == repeats - 1)
-      printf("{\"bench\":\"cells\",\"faces\":\"%s\",\"cells\":[%d,%d],\"maph\":%d,\"maph_faces\":%d,\"vertices\":%d,\"us_overlay\":%.2f,"
-             "\"us_cells\":%.2f,\"us_per_maph\":%.2f,\"bytes_result_per_maph\":%.0f,\"bytes_peak_per_maph\":%.0f}\n",
-             argv[4], l->mesh[0]->num_cells, l->mesh[1]->num_cells, cells->num_cells, cells->num_faces, cells->num_vertices,
-             1e6 * overlay / cells->num_cells, 1e6 * build / cells->num_cells, 1e6 * (overlay + build) / cells->num_cells,
+      printf("{\"bench\":\"cells\",\"case\":\"%s\",\"cells\":[%d,%d],\"triangles\":[%d,%d],\"maph\":%d,\"maph_faces\":%d,"
+             "\"vertices\":%d,\"s_overlay\":%.3f,\"s_cells\":%.3f,\"us_per_maph\":%.2f,\"bytes_result_per_maph\":%.0f,"
+             "\"bytes_peak_per_maph\":%.0f}\n",
+             name, l->mesh[0]->num_cells, l->mesh[1]->num_cells, l->mesh[0]->num_triangles, l->mesh[1]->num_triangles,
+             cells->num_cells, cells->num_faces, cells->num_vertices, overlay, build, 1e6 * (overlay + build) / cells->num_cells,
              (double)rm_arena_bytes(arena) / cells->num_cells, (peak_bytes() - before) / cells->num_cells);
     rm_arena_drop(arena);
   }
   laid_free(l);
   tm_free(source);
   tm_free(target);
+}
+
+int main(int argc, char **argv)
+{
+  if (argc > 3 && !strcmp(argv[1], "spheres")) {
+    run("spheres", sphere(atoi(argv[2]), 0), sphere(atoi(argv[2]), atof(argv[3])), REMAP_FACES_DIAGONAL, argc > 4 ? atoi(argv[4]) : 1);
+  } else if (argc > 2 && !strcmp(argv[1], "cut")) {
+    run("cut", tm_hexahedra((int[]){32, 40, 23}, box_of_grid, NULL), sphere(atoi(argv[2]), 0), REMAP_FACES_DIAGONAL,
+        argc > 3 ? atoi(argv[3]) : 1);
+  } else if (argc > 4) {
+    run(argv[4], tm_benchmark(atoi(argv[1]), argc > 7 ? atof(argv[7]) : 0.7, argc > 6 ? atof(argv[6]) : 0.3, atof(argv[3])),
+        tm_benchmark(atoi(argv[2]), 0.1, 0, 1), strcmp(argv[4], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE,
+        argc > 5 ? atoi(argv[5]) : 1);
+  } else {
+    return fprintf(stderr, "usage: bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]] | spheres LEVEL OFFSET [REPEATS] "
+                           "| cut LEVEL [REPEATS]\n"), 2;
+  }
   return 0;
 }

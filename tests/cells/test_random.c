@@ -86,4 +86,35 @@ static void seeds(int count, bool rough)
 static void straight_meshes_on_one_lattice_have_a_supermesh(void) { seeds(400, false); }
 static void rough_meshes_of_few_bits_have_a_supermesh(void) { seeds(400, true); }
 
-RT_MAIN(RT_CASE(straight_meshes_on_one_lattice_have_a_supermesh), RT_CASE(rough_meshes_of_few_bits_have_a_supermesh))
+/* A mesh of which cells have been taken away by lot: many parts, each of which leaves holes in the large faces of the other. */
+static void crumbs_in_large_cells_have_a_supermesh(void)
+{
+  for (uint64_t number = 1; number <= (rt_long() ? 200 : 12); number++) {
+    uint64_t          seed = 77 * number;
+    const bool        straight = number & 1;
+    const int         before = rt_failed_, n = straight ? 4 : 3 + (int)tm_random(&seed, 4);
+    const remap_faces faces    = number & 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL;
+    tm_mesh          *large = tm_hexahedra((int[]){1, number & 4 ? 2 : 1, 2}, NULL, NULL), *crumbs = NULL;
+
+    if (straight) crumbs = tm_hexahedra((int[]){n, n, n}, tm_affine, (double[]){2, 0, 0, -.5, 0, 1.5, 0, -.25, 0, 0, 1.5, -.5});
+    else crumbs = tm_benchmark(n, 0.3, 0.4, 1.3);
+    for (int64_t v = 0; v < crumbs->view.num_nodes && !straight; v++)
+      for (int c = 0; c < 3; c++) crumbs->xyz[3 * v + c] += .5;
+    uint8_t *keep = tm_alloc_(crumbs->view.num_cells, 1);
+    for (int64_t c = 0; c < crumbs->view.num_cells; c++) keep[c] = tm_random(&seed, 3) == 0;
+    for (int way = 0; way < 2; way++) {
+      const laid_how how = {.keep = {way ? keep : NULL, way ? NULL : keep}};
+      super          s   = super_of(way ? crumbs : large, way ? large : crumbs, faces, &how, RM_CELLS_UNION);
+
+      super_check(&s, -1, straight);
+      laid_free(s.l);
+    }
+    if (rt_failed_ > before) printf("# number %d\n", (int)number);
+    free(keep);
+    tm_free(large);
+    tm_free(crumbs);
+  }
+}
+
+RT_MAIN(RT_CASE(straight_meshes_on_one_lattice_have_a_supermesh), RT_CASE(rough_meshes_of_few_bits_have_a_supermesh),
+        RT_CASE(crumbs_in_large_cells_have_a_supermesh))
