@@ -219,6 +219,36 @@ static void what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement(v
   close_world(&w);
 }
 
+static void transfers_that_differ_between_ranks_are_refused_where_they_meet(void)
+{
+  world w;
+
+  if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 9)) {
+    double          *v = tm_alloc_(w.cells[1], sizeof *v), *good = moved(&w, 0);
+    remap_transfer   how = nearest();
+    remap_field_desc f[2];
+    const bool       is_last = rt_rank() == rt_size() - 1;
+
+    how.order = 1;
+    for (int k = 0; k < 2; k++) f[k] = (remap_field_desc){.nature = REMAP_CONSERVED, .in = w.u[0], .out = v};
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 2, f, NULL), REMAP_OK);
+    for (int kind = 0; kind < 2 && rt_size() > 1; kind++) {
+      remap_status mine;
+
+      f[0].nature = kind == 0 && is_last ? REMAP_FLAG : REMAP_CONSERVED;
+      mine        = remap_field(w.ctx, REMAP_FORWARD, &how, kind == 1 && is_last ? 1 : 2, f, NULL);
+      RT_EQ(remap_agree(w.ctx, mine), REMAP_BAD_ARGUMENT);
+      if (is_last) RT_CHECK(mine == REMAP_BAD_ARGUMENT && strstr(remap_message(w.ctx), "neighbouring rank") != NULL);
+    }
+    f[0].nature = REMAP_CONSERVED;
+    how.order   = 2;
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, f, NULL), REMAP_OK);
+    RT_CHECK(same(v, good, w.cells[1]));
+    free(v), free(good);
+  }
+  close_world(&w);
+}
+
 /* ---- layout ------------------------------------------------------------------------------------------------------------ */
 
 static void strides_and_places_leave_the_rest_alone(void)
@@ -444,6 +474,7 @@ static void contexts_do_not_know_of_each_other(void)
 RT_MAIN(RT_CASE(halves_make_the_same_as_a_whole_in_both_directions_at_once),
         RT_CASE(halves_out_of_order_are_refused_and_a_context_may_end_between_them), RT_CASE(transfers_after_the_first_take_no_memory),
         RT_CASE(ranks_without_cells_take_no_part_after_the_first_transfer),
-        RT_CASE(what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement), RT_CASE(strides_and_places_leave_the_rest_alone),
+        RT_CASE(what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement),
+        RT_CASE(transfers_that_differ_between_ranks_are_refused_where_they_meet), RT_CASE(strides_and_places_leave_the_rest_alone),
         RT_CASE(blocks_with_indices_of_any_kind_make_the_same_bits_as_one_mesh), RT_CASE(masked_cells_are_as_good_as_not_there),
         RT_CASE(contexts_do_not_know_of_each_other))

@@ -73,7 +73,8 @@ typedef struct rm_flow {
   char          *arrived;  /* messages from others likewise                                                */
   char          *received; /* [plan->recv_offset[plan->num_recv]] items of the last run, in the plan's order */
   MPI_Request   *request;
-  int            num_requests; /* under way */
+  MPI_Status    *status;       /* of the requests */
+  int            num_requests; /* under way       */
 } rm_flow;
 
 /* Room for runs of at most `most` bytes per item. Not collective. Lives in arena. NO_MEMORY. */
@@ -81,7 +82,7 @@ remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_
 /* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards. */
 remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const void *item, rm_note note);
 /* Wait until this rank has received and sent; flow->received then holds the items. The status in note becomes the greatest of its
- * own and the senders'. BAD_ARGUMENT if a sender's mark differs. */
+ * own and the senders'. BAD_ARGUMENT if a sender's mark or size differs. */
 remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_note *note);
 
 #endif

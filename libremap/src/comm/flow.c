@@ -27,6 +27,7 @@ remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan 
   RM_NEW(flow.arrived, arena, rm_add_sat(rm_mul_sat(from_all, (int64_t)most), notes * plan->num_recv));
   RM_NEW(flow.received, arena, rm_mul_sat(from_all, (int64_t)most));
   RM_NEW(flow.request, arena, num_requests);
+  RM_NEW(flow.status, arena, num_requests);
   *out = flow;
   return REMAP_OK;
 }
@@ -101,14 +102,32 @@ remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const
   return REMAP_OK;
 }
 
+/* A message longer than expected comes of a sender that has another run in mind. */
+static remap_status wait_all(rm_flow *flow)
+{
+  const int    num    = flow->num_requests;
+  const int    error  = MPI_Waitall(num, flow->request, flow->status);
+  remap_status status = rm_comm_status(error);
+  int          class  = MPI_SUCCESS;
+
+  flow->num_requests = 0;
+  if (error != MPI_SUCCESS) MPI_Error_class(error, &class);
+  for (int i = 0; i < num && class == MPI_ERR_IN_STATUS; i++) {
+    int own = MPI_SUCCESS;
+
+    MPI_Error_class(flow->status[i].MPI_ERROR, &own);
+    if (own == MPI_ERR_TRUNCATE) status = REMAP_BAD_ARGUMENT;
+    else if (own != MPI_SUCCESS && own != MPI_ERR_PENDING) return REMAP_MPI_FAILURE;
+  }
+  return status;
+}
+
 remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_note *note)
 {
   const rm_plan *plan = flow->plan;
-  const int      num  = flow->num_requests;
-  remap_status   mine = REMAP_OK;
+  remap_status   mine = wait_all(flow);
 
-  flow->num_requests = 0;
-  RM_TRY(rm_comm_status(MPI_Waitall(num, flow->request, MPI_STATUSES_IGNORE)));
+  if (mine != REMAP_OK) return mine;
   for (int i = 0; i < plan->num_recv; i++) {
     const char   *message = flow->arrived + start_of(plan->recv_offset, i, flow->size);
     const int64_t first = plan->recv_offset[i], num_items = plan->recv_offset[i + 1] - first;
