@@ -228,6 +228,29 @@ static void fields_are_the_same_bits_on_any_ranks_for_any_partition_and_numberin
     }
 }
 
-RT_MAIN(RT_CASE(every_kind_of_mesh_keeps_the_promises), RT_CASE(scaled_and_moved_meshes_keep_the_promises),
+static void cells_across_a_patched_interface_are_covered_unless_it_gapes(void)
+{
+  static const struct {
+    double gap;
+    int    covered;
+  } cases[] = {{0, 2}, {0x1p-53, 2}, {-0x1p-54, 2}, {1e-3, 0}, {-1e-3, 0}};
+
+  for (int k = 0; k < 5; k++) {
+    tm_mesh    *source = tm_two_zones((int[]){1, 2, 2}, (int[]){1, 1, 3}, cases[k].gap, NULL, NULL);
+    tm_mesh    *target = tm_hexahedra((int[]){1, 1, 2}, NULL, NULL);
+    bench       b;
+    remap_stats stats;
+
+    if (set_up(&b, MPI_COMM_WORLD, source, target, REMAP_FACES_CENTRE, 0)) {
+      RT_EQ(remap_get_stats(b.ctx, &stats), REMAP_OK);
+      if (!RT_EQ(stats.cells_by_cover[1][REMAP_COVERED], cases[k].covered)) printf("# gap %g\n", cases[k].gap);
+      RT_EQ(stats.cells_by_cover[1][REMAP_PARTIAL], 2 - cases[k].covered);
+    }
+    tear_down(&b);
+    tm_free(source), tm_free(target);
+  }
+}
+
+RT_MAIN(RT_CASE(cells_across_a_patched_interface_are_covered_unless_it_gapes), RT_CASE(every_kind_of_mesh_keeps_the_promises), RT_CASE(scaled_and_moved_meshes_keep_the_promises),
         RT_CASE(remapping_onto_the_same_mesh_is_a_bitwise_copy),
         RT_CASE(fields_are_the_same_bits_on_any_ranks_for_any_partition_and_numbering))
