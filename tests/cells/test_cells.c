@@ -220,6 +220,49 @@ static void components_of_a_pair_are_cells_of_their_own(void)
   tm_free(b);
 }
 
+/* Two boxes apart within one: three shells, two of them voids. */
+static void a_cell_may_have_several_voids(void)
+{
+  static const spacing big = {1, {0, 160}}, three_of_them = {3, {20, 40, 80, 100}}, small = {1, {20, 40}};
+  tm_mesh *a = boxes(&big, &big, &big, NULL), *b = boxes(&three_of_them, &small, &small, NULL);
+  uint8_t  keep[3] = {1, 0, 1};
+
+  for (int way = 0; way < 2; way++) {
+    const laid_how how = {.keep = {way ? keep : NULL, way ? NULL : keep}};
+    super          s   = super_of(way ? b : a, way ? a : b, REMAP_FACES_CENTRE, &how, RM_CELLS_UNION);
+    super_check(&s, 1, true);
+    if (s.status == REMAP_OK) RT_EQ(s.cells->num_cells, 3);
+    laid_free(s.l);
+  }
+  tm_free(a);
+  tm_free(b);
+}
+
+/* A void in one of the two parts that a slab leaves of a cell belongs to that part. */
+static void a_void_belongs_to_the_part_around_it(void)
+{
+  static const spacing big = {1, {0, 160}}, layers = {3, {20, 40, 80, 100}}, wide_around = {3, {-20, 60, 80, 180}};
+  tm_mesh *a = boxes(&big, &big, &big, NULL), *b = boxes(&layers, &wide_around, &wide_around, NULL);
+  uint8_t  keep[27] = {0};
+  int      voids    = 0;
+
+  for (int k = 0; k < 9; k++) keep[3 * k + 2] = 1; /* the slab between 80 and 100 */
+  keep[3 * 4]      = 1;                            /* a box within what is below */
+  const laid_how how = {.keep = {NULL, keep}};
+  super          s   = super_of(a, b, REMAP_FACES_CENTRE, &how, RM_CELLS_UNION);
+  super_check(&s, 1, true);
+  for (rm_lid c = 0; s.status == REMAP_OK && c < s.cells->num_cells; c++) {
+    const double unit = s.l->frame.scale * s.l->frame.scale * s.l->frame.scale;
+    if (s.cells->cell_ancestor[c][0] < 0 || s.cells->cell_ancestor[c][1] >= 0) continue;
+    voids += fabs(s.cells->cell_volume[c] / unit - (160. * 160 * 80 - 20 * 20 * 20)) < 1e-6;
+    RT_CHECK(s.cells->cell_volume[c] / unit < 160. * 160 * 80 - 1);
+  }
+  RT_EQ(voids, 1);
+  laid_free(s.l);
+  tm_free(a);
+  tm_free(b);
+}
+
 static void cells_that_overlap_are_refused(void)
 {
   tm_mesh *a = tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -0.25, NULL, NULL), *b = boxes(&one, &one, &one, NULL);
@@ -240,4 +283,5 @@ RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(child
         RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(operations_add_up),
         RT_CASE(identical_operands_are_their_union_and_leave_no_difference), RT_CASE(operands_with_one_skin_leave_no_difference),
         RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
-        RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(cells_that_overlap_are_refused))
+        RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),
+        RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused))

@@ -227,7 +227,10 @@ static remap_status collect_shells(work *w, shells *s)
   for (rm_lid k = 0; k < s->num; k++) s->inside[k] = k, s->label[k] = label_of(w, s->first_side[k]);
   for (rm_lid k = 0; k < sides; k++)
     if (s->of[k] >= 0) s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), NULL);
-  for (rm_lid k = 0; k < s->num; k++) any = any || (s->is_void[k] = s->volume[k] < 0);
+  for (rm_lid k = 0; k < s->num; k++) {
+    s->is_void[k] = s->volume[k] < 0;
+    any           = any || s->is_void[k];
+  }
   for (rm_lid k = 0; k < sides && any; k++)
     if (s->of[k] >= 0 && s->is_void[s->of[k]]) cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), &noise[s->of[k]]);
   for (rm_lid k = 0; k < s->num && any; k++) s->is_void[k] = s->is_void[k] && 6 * s->volume[k] < -noise[k];
