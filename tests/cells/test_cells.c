@@ -275,6 +275,45 @@ static void cells_that_overlap_are_refused(void)
   tm_free(b);
 }
 
+/* ---- numbering -------------------------------------------------------------------------------------------------------------------- */
+
+static void compare(const super *s, const super *t)
+{
+  const rm_cells *a = s->cells, *b = t->cells;
+  int64_t         different = 0;
+
+  if (!RT_EQ(b->num_vertices, a->num_vertices) || !RT_EQ(b->num_faces, a->num_faces) || !RT_EQ(b->num_cells, a->num_cells)) return;
+  RT_CHECK(!memcmp(a->vertex, b->vertex, sizeof *a->vertex * (size_t)a->num_vertices));
+  RT_CHECK(!memcmp(a->face_offset, b->face_offset, sizeof *a->face_offset * ((size_t)a->num_faces + 1)));
+  RT_CHECK(!memcmp(a->face_vertex, b->face_vertex, sizeof *a->face_vertex * (size_t)a->face_offset[a->num_faces]));
+  RT_CHECK(!memcmp(a->face_cell, b->face_cell, sizeof *a->face_cell * (size_t)a->num_faces));
+  RT_CHECK(!memcmp(a->cell_volume, b->cell_volume, sizeof *a->cell_volume * (size_t)a->num_cells));
+  for (rm_lid c = 0; c < a->num_cells; c++)
+    for (int side = 0; side < 2; side++) {
+      const rm_lid x = a->cell_ancestor[c][side], y = b->cell_ancestor[c][side];
+      different += (x < 0 ? -1 : s->l->part.piece[side].cell_global[x]) != (y < 0 ? -1 : t->l->part.piece[side].cell_global[y]);
+    }
+  RT_EQ(different, 0);
+}
+
+static void numbering_and_senders_change_no_bit(void)
+{
+  tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
+                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
+                         {tm_dual((int[]){2, 2, 2}, NULL, NULL), tm_mixed((int[]){5, 2, 1}, NULL, NULL)}};
+
+  for (int k = 0; k < 3; k++) {
+    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    for (int senders = 1; senders < 4; senders++) {
+      super t = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, &(laid_how){.shuffle = 5 + (uint64_t)senders, .senders = senders}, RM_CELLS_UNION);
+      if (RT_EQ(s.status, REMAP_OK) && RT_EQ(t.status, REMAP_OK)) compare(&s, &t);
+      laid_free(t.l);
+    }
+    laid_free(s.l);
+    for (int side = 0; side < 2; side++) tm_free(pair[k][side]);
+  }
+}
+
 RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents), RT_CASE(a_box_around_all),
         RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut), RT_CASE(boxes_that_abut_askew),
         RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
@@ -284,4 +323,5 @@ RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(child
         RT_CASE(identical_operands_are_their_union_and_leave_no_difference), RT_CASE(operands_with_one_skin_leave_no_difference),
         RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
         RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),
-        RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused))
+        RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused),
+        RT_CASE(numbering_and_senders_change_no_bit))
