@@ -314,6 +314,38 @@ static void numbering_and_senders_change_no_bit(void)
   }
 }
 
+static int by_coordinates(const void *a, const void *b)
+{
+  const double *x = a, *y = b;
+
+  for (int c = 0; c < 3; c++)
+    if (x[c] != y[c]) return x[c] < y[c] ? -1 : 1;
+  return 0;
+}
+
+static void which_mesh_is_the_source_moves_no_vertex(void)
+{
+  tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
+                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
+                         {boxes(&two, &two, &two, warp), boxes(&three, &two, &three, NULL)}};
+
+  for (int k = 0; k < 3; k++) {
+    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    super t = super_of(pair[k][1], pair[k][0], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    if (RT_EQ(s.status, REMAP_OK) && RT_EQ(t.status, REMAP_OK) && RT_EQ(t.cells->num_vertices, s.cells->num_vertices)) {
+      RT_EQ(t.cells->num_faces, s.cells->num_faces);
+      RT_EQ(t.cells->num_cells, s.cells->num_cells);
+      RT_EQ(t.cells->face_offset[t.cells->num_faces], s.cells->face_offset[s.cells->num_faces]);
+      qsort((void *)s.cells->vertex, (size_t)s.cells->num_vertices, sizeof *s.cells->vertex, by_coordinates);
+      qsort((void *)t.cells->vertex, (size_t)t.cells->num_vertices, sizeof *t.cells->vertex, by_coordinates);
+      RT_CHECK(!memcmp(s.cells->vertex, t.cells->vertex, sizeof *s.cells->vertex * (size_t)s.cells->num_vertices));
+    }
+    laid_free(s.l);
+    laid_free(t.l);
+    for (int side = 0; side < 2; side++) tm_free(pair[k][side]);
+  }
+}
+
 RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents), RT_CASE(a_box_around_all),
         RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut), RT_CASE(boxes_that_abut_askew),
         RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
@@ -324,4 +356,5 @@ RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(child
         RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
         RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),
         RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused),
-        RT_CASE(numbering_and_senders_change_no_bit))
+        RT_CASE(numbering_and_senders_change_no_bit),
+        RT_CASE(which_mesh_is_the_source_moves_no_vertex))

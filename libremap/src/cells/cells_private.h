@@ -82,8 +82,8 @@ bool rm_off_plane(const double a[3], const double b[3], const double c[3], doubl
  * line[0] is that. */
 bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3]);
 
-/* A plane through a vertex of the other mesh that lies on edge e. */
-void rm_vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3], double plane[3][3]);
+/* For a spot inside an edge of mesh `side`: three points of a plane, not along that edge, in which the other mesh has the spot. */
+void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double plane[3][3]);
 
 /* Signs within one triangle's plane, seen from its normal's tip: projected along axis. */
 typedef struct rm_view {

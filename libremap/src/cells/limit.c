@@ -430,25 +430,6 @@ static remap_status line_room(line *l)
   return rm_grow(&l->state, &l->room[1], l->num + 1, sizeof *l->state);
 }
 
-static void plane_of_spot(const builder *b, int side, rm_lid e, rm_lid p, double plane[3][3])
-{
-  const rm_spot *s = &b->l->spot[p];
-  double         ignored[2][3];
-
-  if (s->at[1 - side].kind == RM_ON_VERTEX)
-    rm_vertex_plane(b->l->o->mesh[side], e, b->l->o->mesh[1 - side]->vertex[s->at[1 - side].id], plane);
-  else if (s->at[0].kind != RM_ON_EDGE || side == 0)
-    rm_spot_meeting(b->l->o, s, ignored, plane);
-  else { /* two edges: seen from that of mesh 2 */
-    const rm_trimesh *m1 = b->l->o->mesh[0], *m2 = b->l->o->mesh[1];
-    const rm_lid     *f = m1->edge[s->at[0].id];
-    memcpy(plane[0], m1->vertex[f[0]], sizeof plane[0]);
-    memcpy(plane[1], m1->vertex[f[1]], sizeof plane[1]);
-    if (!rm_off_plane(plane[0], plane[1], m2->vertex[m2->edge[e][0]], plane[2]))
-      rm_off_plane(plane[0], plane[1], m2->vertex[m2->edge[e][1]], plane[2]);
-  }
-}
-
 /* Put a spot inside edge e, which has no crossing, to its place among those from first on. */
 static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, int64_t first, rm_lid p)
 {
@@ -459,10 +440,10 @@ static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, i
 
   for (int64_t k = first; k < l->num; k++)
     if (l->spot[k] == p) return REMAP_OK;
-  plane_of_spot(b, side, e, p, mine);
+  rm_spot_plane(b->l->o, &b->l->spot[p], side, mine);
   while (low < high) {
     const int64_t middle = (low + high) / 2;
-    plane_of_spot(b, side, e, l->spot[middle], its);
+    rm_spot_plane(b->l->o, &b->l->spot[l->spot[middle]], side, its);
     if (rm_crossing_order(p0, p1, (const double (*)[3])mine, (const double (*)[3])its, 1) < 0) high = middle;
     else low = middle + 1;
   }

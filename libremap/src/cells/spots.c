@@ -29,7 +29,8 @@ bool rm_off_plane(const double a[3], const double b[3], const double c[3], doubl
   return false;
 }
 
-void rm_vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3], double plane[3][3])
+/* A plane through a vertex of the other mesh that lies on edge e. */
+static void vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3], double plane[3][3])
 {
   const double *p0 = own->vertex[own->edge[e][0]], *p1 = own->vertex[own->edge[e][1]];
   int           k = 0;
@@ -41,28 +42,50 @@ void rm_vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3], do
   plane[2][(k + 2) % 3] += 1;
 }
 
-static void copy_point(double to[3], const rm_trimesh *m, rm_lid v) { memcpy(to, m->vertex[v], 3 * sizeof *to); }
+void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double plane[3][3])
+{
+  const rm_trimesh *own = o->mesh[side], *other = o->mesh[1 - side];
+  const rm_feature  f   = spot->at[1 - side];
+  const rm_lid     *e   = own->edge[spot->at[side].id];
+
+  switch (f.kind) {
+    case RM_ON_VERTEX: vertex_plane(own, spot->at[side].id, other->vertex[f.id], plane); break;
+    case RM_ON_EDGE:
+      for (int h = 0; h < 2; h++) memcpy(plane[h], other->vertex[other->edge[f.id][h]], sizeof plane[h]);
+      if (!rm_off_plane(plane[0], plane[1], own->vertex[e[0]], plane[2])) rm_off_plane(plane[0], plane[1], own->vertex[e[1]], plane[2]);
+      break;
+    default:
+      for (int h = 0; h < 3; h++) memcpy(plane[h], other->vertex[other->triangle[f.id][h]], sizeof plane[h]);
+  }
+}
+
+/* Of two edges, the mesh whose edge begins at the lower point, or ends there: whichever mesh is called the first. */
+static int lower_edge(const rm_overlay *o, const rm_spot *spot)
+{
+  const rm_lid *e = o->mesh[0]->edge[spot->at[0].id], *f = o->mesh[1]->edge[spot->at[1].id];
+
+  for (int h = 0; h < 2; h++)
+    for (int c = 0; c < 3; c++) {
+      const double x = o->mesh[0]->vertex[e[h]][c], y = o->mesh[1]->vertex[f[h]][c];
+      if (x != y) return x < y ? 0 : 1;
+    }
+  return 0;
+}
 
 bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3])
 {
+  const bool edge[2] = {spot->at[0].kind == RM_ON_EDGE, spot->at[1].kind == RM_ON_EDGE};
+
   for (int side = 0; side < 2; side++)
     if (spot->at[side].kind == RM_ON_VERTEX) {
-      copy_point(line[0], o->mesh[side], spot->at[side].id);
+      memcpy(line[0], o->mesh[side]->vertex[spot->at[side].id], sizeof line[0]);
       return false;
     }
-  const int         own  = spot->at[0].kind == RM_ON_EDGE ? 0 : 1;
-  const rm_trimesh *m = o->mesh[own], *other = o->mesh[1 - own];
-  const rm_feature  f    = spot->at[1 - own];
+  const int         own = edge[0] && edge[1] ? lower_edge(o, spot) : edge[0] ? 0 : 1;
+  const rm_trimesh *m   = o->mesh[own];
 
-  for (int h = 0; h < 2; h++) copy_point(line[h], m, m->edge[spot->at[own].id][h]);
-  if (f.kind == RM_ON_TRIANGLE) {
-    for (int h = 0; h < 3; h++) copy_point(plane[h], other, other->triangle[f.id][h]);
-  } else {
-    for (int h = 0; h < 2; h++) copy_point(plane[h], other, other->edge[f.id][h]);
-    const bool found = rm_off_plane(plane[0], plane[1], line[0], plane[2]) || rm_off_plane(plane[0], plane[1], line[1], plane[2]);
-    RM_ASSERT(found);
-    (void)found;
-  }
+  for (int h = 0; h < 2; h++) memcpy(line[h], m->vertex[m->edge[spot->at[own].id][h]], sizeof line[h]);
+  rm_spot_plane(o, spot, own, plane);
   return true;
 }
 
