@@ -6,7 +6,7 @@
  *   remap_build       overlay the two meshes                         (collective)
  *   remap_move        overlay them again in a new position           (collective)
  *   remap_set_masks   say which cells give and which want values     (collective)
- *   remap_field       move cell fields across, either way            (collective)
+ *   remap_field       move cell fields across, either way            (by all ranks; among neighbours)
  *   remap_destroy     give everything back                           (collective)
  *
  * The overlay gives, for every source cell i and target cell j that share volume,
@@ -21,7 +21,7 @@
  *   - ranks without cells are welcome: their counts are 0 and their arrays may be NULL;
  *   - outputs are written only when REMAP_OK is returned;
  *   - lengths are in the caller's unit, volumes in that unit cubed;
- *   - indices are 0-based and local to the rank unless named "global";
+ *   - indices are 0-based (but see index_base) and local to the rank unless named "global";
  *   - no function prints, exits, or keeps state outside its context;
  *   - a context is used by one thread at a time; different contexts do not know of each other.
  */
@@ -239,8 +239,8 @@ typedef struct remap_stats {
 } remap_stats;
 
 /** Pairs of one direction as rows of a sparse matrix, one row per receiving cell of this rank. A view: owned by the
- *  context, valid until the next remap_build, remap_move, remap_set_masks or remap_destroy. Within a row the order is canonical: it depends on
- *  coordinates only. */
+ *  context, valid until the next remap_build, remap_move, remap_set_masks or remap_destroy. Within a row the order is
+ *  canonical: it depends on coordinates only. */
 typedef struct remap_pairs_view {
   int64_t        num_rows;   /**< receiving cells on this rank */
   const int64_t *row_offset; /**< [num_rows + 1] */
@@ -274,46 +274,50 @@ REMAP_API remap_status remap_create(MPI_Comm comm, const remap_options *options,
  *  the last overlay unusable. Errors: BAD_ARGUMENT. */
 REMAP_API remap_status remap_set_mesh(remap_context *ctx, remap_side side, const remap_mesh *mesh);
 
-/** The same for a rank whose part consists of several blocks, each a mesh with nodes and numbers of its own. Cells of a rank are
- *  numbered block after block in everything that is per cell; faces between blocks join by coordinates like those between
- *  ranks. Name and zones are the first block's, so a mesh with zones has a block, maybe without cells, on every rank. block is copied, what it points to is borrowed as in remap_set_mesh; num_blocks may
- *  be 0 and differ between ranks. Not collective. Errors: BAD_ARGUMENT, NO_MEMORY. */
+/** The same for a rank whose part consists of several blocks, each a mesh with nodes and numbers of its own. Cells of a
+ *  rank are numbered block after block in everything that is per cell; faces between blocks join by coordinates like those
+ *  between ranks. Name and zones are the first block's, so a mesh with zones has a block, maybe without cells, on every
+ *  rank. block is copied, what it points to is borrowed as in remap_set_mesh; num_blocks may be 0 and differ between ranks.
+ *  Not collective.
+ *  Errors: BAD_ARGUMENT, NO_MEMORY. */
 REMAP_API remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_blocks, const remap_mesh *block);
 
 /** Overlay the two meshes. Collective. Errors: BAD_ORDER (a mesh is missing on this or another rank), BAD_MESH,
  *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
 REMAP_API remap_status remap_build(remap_context *ctx);
 
-/** Overlay the meshes in a new position. Collective, after remap_build; motion is [side]. The result is the same, bit by bit, as
- *  that of a remap_build with the moved coordinates; a mesh that stays is not read again. Whoever calls this keeps what
- *  remap_set_mesh and the last motion lent, unchanged, until the next remap_build or remap_destroy. A matrix is applied to the
- *  lent coordinates each time anew, so that motions do not add up. Masks end. If it fails, remap_build comes next.
+/** Overlay the meshes in a new position. Collective, after remap_build; motion is [side]. The result is the same, bit by
+ *  bit, as that of a remap_build with the moved coordinates; a mesh that stays is not read again. Whoever calls this keeps
+ *  what remap_set_mesh and the last motion lent, unchanged, until the next remap_build or remap_destroy. A matrix is
+ *  applied to the lent coordinates each time anew, so that motions do not add up. Masks end. If it fails, remap_build comes
+ *  next.
  *  Errors: those of remap_build; BAD_ORDER (no overlay, a mesh set since, or a transfer under way), BAD_ARGUMENT. */
 REMAP_API remap_status remap_move(remap_context *ctx, const remap_motion motion[2]);
 
-/** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build, remap_move or call, and are
- *  copied. A pair of cells counts if the one gives and the other wants: coverage, pairs, integrals and reconstruction know no others,
- *  so what a masked cell holds is never read, not even as a neighbour, and a cell that does not want is never written. NULL: no
- *  masks. remap_stats stays as it is. Errors: BAD_ORDER (no overlay, or a transfer under way), NO_MEMORY, MPI_FAILURE. */
+/** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build, remap_move
+ *  or call, and are copied. A pair of cells counts if the one gives and the other wants: coverage, pairs, integrals and
+ *  reconstruction know no others, so what a masked cell holds is never read, not even as a neighbour, and a cell that does
+ *  not want is never written. NULL: no masks. remap_stats stays as it is.
+ *  Errors: BAD_ORDER (no overlay, or a transfer under way), NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *masks);
 
-/** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on all of
- *  them. The first call in a direction after a build, and one that asks for more than those before (more fields, order 2, bounds,
- *  nearest cells), prepares it: it is collective. So is a call with reports, [num_fields] on every rank or NULL on every rank, which
- *  get the same content everywhere. Any other call exchanges messages with neighbours only and takes no memory: its status is
- *  the worst of this rank's own and of those neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes
- *  it one. Values below 1e-280 count as 0.
+/** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
+ *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields,
+ *  order 2, bounds, nearest cells), prepares it: it is collective. So is a call with reports, [num_fields] on every rank or
+ *  NULL on every rank, which get the same content everywhere. Any other call exchanges messages with neighbours only and
+ *  takes no memory: its status is the worst of this rank's own and of those neighbours' whose values it uses, and may
+ *  differ from rank to rank; remap_agree makes it one. Values below 1e-280 count as 0.
  *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value), COVERAGE, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
                                    const remap_field_desc *fields, remap_field_report *reports);
 
-/** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them and
- *  sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes. fields and
- *  transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change. One transfer in
- *  each direction and context may be under way; all ranks start and finish them in the same order, and none builds, moves or masks in
- *  between.
- *  A start that fails does so on all ranks alike and leaves nothing under way; what is wrong with this rank's own values is
- *  told by the finish. Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
+/** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them
+ *  and sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes.
+ *  fields and transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change.
+ *  One transfer in each direction and context may be under way; all ranks start and finish them in the same order, and none
+ *  builds, moves or masks in between. A start that fails does so on all ranks alike and leaves nothing under way; what is
+ *  wrong with this rank's own values is told by the finish.
+ *  Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
 REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
                                          int num_fields, const remap_field_desc *fields);
 REMAP_API remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports);
@@ -332,12 +336,14 @@ REMAP_API remap_status remap_get_stats(const remap_context *ctx, remap_stats *ou
  *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY. */
 REMAP_API remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out);
 
-/** How much of each cell of one side is covered by cells of the other mesh that give. Not collective. fraction and cover, [cells of that side
- *  on this rank], are the caller's; either may be NULL. Errors: BAD_ORDER. */
+/** How much of each cell of one side is covered by cells of the other mesh that give. Not collective. fraction and cover,
+ *  [cells of that side on this rank], are the caller's; either may be NULL.
+ *  Errors: BAD_ORDER. */
 REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover);
 
-/** The cells of one side on this rank that want values and get none, because nothing that gives covers any of them, ascending. Not
- *  collective. num receives their number; cell [*num] is the caller's and may be NULL. Errors: BAD_ORDER, BAD_ARGUMENT. */
+/** The cells of one side on this rank that want values and get none, because nothing that gives covers any of them,
+ *  ascending. Not collective. num receives their number; cell [*num] is the caller's and may be NULL.
+ *  Errors: BAD_ORDER, BAD_ARGUMENT. */
 REMAP_API remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
 
 /** Volumes (signed: negative for an inverted cell) and centroids of the cells of one side. Not collective. volume [cells]

@@ -1,5 +1,5 @@
-/* blocks -- the caller's blocks as one mesh with 64-bit indices from 0. A single block that is so already is passed on as it is;
- * else O(n) time and memory, which lasts as long as the build. */
+/* blocks -- the caller's blocks as one mesh with 64-bit indices from 0. A single block that is so already is passed on as it
+ * is; else O(n) time and memory, which lasts as long as the build. */
 #include "api/context.h"
 
 #include <string.h>
@@ -34,8 +34,9 @@ static remap_status check_block(int side, int number, const remap_mesh *b, rm_re
   const indices owner = {b->face_owner, b->face_owner32}, neighbour = {b->face_neighbour, b->face_neighbour32};
 
   if (b->num_nodes < 0 || b->num_faces < 0 || b->num_cells < 0)
-    return rm_fail(REMAP_BAD_MESH, reason, side, -1, "block %d has %lld nodes, %lld faces and %lld cells: give counts that are not "
-                   "negative", number, (long long)b->num_nodes, (long long)b->num_faces, (long long)b->num_cells);
+    return rm_fail(REMAP_BAD_MESH, reason, side, -1,
+                   "block %d has %lld nodes, %lld faces and %lld cells: give counts that are not negative", number,
+                   (long long)b->num_nodes, (long long)b->num_faces, (long long)b->num_cells);
   if (b->num_nodes > INT32_MAX || b->num_faces > INT32_MAX || b->num_cells > INT32_MAX)
     return rm_fail(REMAP_TOO_LARGE, reason, side, -1, "block %d has more than %d nodes, faces or cells: use more ranks", number,
                    INT32_MAX);
@@ -44,10 +45,11 @@ static remap_status check_block(int side, int number, const remap_mesh *b, rm_re
   if ((b->num_nodes > 0 && !b->node_xyz) || is_missing(offset, b->num_faces) || is_missing(node, b->num_faces) ||
       is_missing(owner, b->num_faces) || is_missing(neighbour, b->num_faces))
     return rm_fail(REMAP_BAD_MESH, reason, side, -1,
-                   "node_xyz, face_offset, face_node, face_owner or face_neighbour of block %d is NULL: give the array", number);
+                   "node_xyz, face_offset, face_node, face_owner or face_neighbour of block %d is NULL: give the array",
+                   number);
   if (b->num_faces > 0 && at(offset, 0) != b->index_base)
-    return rm_fail(REMAP_BAD_MESH, reason, side, -1, "face_offset of block %d starts with %lld: it starts with index_base", number,
-                   (long long)at(offset, 0));
+    return rm_fail(REMAP_BAD_MESH, reason, side, -1, "face_offset of block %d starts with %lld: it starts with index_base",
+                   number, (long long)at(offset, 0));
   for (int64_t f = 0; f < b->num_faces; f++)
     if (at(offset, f) > at(offset, f + 1))
       return rm_fail(REMAP_BAD_MESH, reason, side, -1, "face_offset of block %d does not ascend at face %lld: %lld, then %lld",
@@ -119,7 +121,8 @@ static remap_status join_ids(rm_arena *passing, int side, int num_blocks, const 
   return REMAP_OK;
 }
 
-static remap_status join(rm_arena *passing, int side, int num_blocks, const remap_mesh *block, remap_mesh *out, rm_reason *reason)
+static remap_status join(rm_arena *passing, int side, int num_blocks, const remap_mesh *block, remap_mesh *out,
+                         rm_reason *reason)
 {
   int64_t  corners = 0, *offset, *node, *owner, *neighbour;
   double  *xyz;

@@ -1,4 +1,5 @@
-/* build -- remap_build: the stages in order, one agreement each. What only the overlay needs lives in an arena that ends with it. */
+/* build -- remap_build and remap_move: the stages in order, one agreement each. What only the overlay needs lives in an arena that
+ * ends with it. */
 #include "api/context.h"
 
 #include <math.h>
@@ -181,7 +182,8 @@ remap_status remap_move(remap_context *ctx, const remap_motion motion[2])
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
   if (!ctx->is_built)
-    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "remap_move needs a successful remap_build of meshes that were not set since");
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1,
+                     "remap_move needs a successful remap_build of meshes that were not set since");
   else if (rm_context_is_busy(ctx))
     status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
   else if (!motion)

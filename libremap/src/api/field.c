@@ -12,7 +12,8 @@ static remap_status check_agreed(const remap_context *ctx, remap_direction direc
   if (direction != REMAP_FORWARD && direction != REMAP_BACKWARD)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "direction is %d, neither forward nor backward", (int)direction);
   if (rm_carrier_is_under_way(ctx->carrier[direction]))
-    return rm_fail(REMAP_BAD_ORDER, reason, -1, -1, "a transfer in this direction is under way: remap_field_finish comes first");
+    return rm_fail(REMAP_BAD_ORDER, reason, -1, -1,
+                   "a transfer in this direction is under way: remap_field_finish comes first");
   if (how->order < 1 || how->order > ctx->options.max_order)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "order %d is not within 1..%d, the context's max_order", how->order,
                    ctx->options.max_order);
@@ -123,7 +124,8 @@ static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_gi
   if (*stencil) return REMAP_OK;
   if (!mask && !ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
   RM_TRY(rm_comm_agree(&ctx->comm, mask || ctx->stencil_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  return rm_stencil_build(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil);
+  return rm_stencil_build(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side], mask,
+                          stencil);
 }
 
 /* Second moments of both sides' cells, and the wider stencil of the giving side, whose stencil is there. Collective. */
@@ -209,7 +211,8 @@ remap_status remap_field_finish(remap_context *ctx, remap_direction direction, r
   RM_REQUIRE(ctx && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
   if (!rm_carrier_is_under_way(ctx->carrier[direction])) {
-    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "no transfer in this direction is under way: remap_field_start comes first");
+    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1,
+                     "no transfer in this direction is under way: remap_field_start comes first");
   } else {
     const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
 

@@ -102,7 +102,8 @@ static void lay_out(rm_carrier *c, int num_fields)
 static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
 {
   for (rm_lid c = 0; c < stencil->num_cells; c++) {
-    for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++) needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
+    for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++)
+      needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
     for (int64_t k = stencil->wide_offset ? stencil->wide_offset[c] : 0; stencil->wide_offset && k < stencil->wide_offset[c + 1]; k++)
       needs_halo[c] |= stencil->wide_neighbour[k] >= stencil->num_cells;
   }
