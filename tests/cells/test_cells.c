@@ -100,6 +100,30 @@ static void refined_on_mixed(void)
   agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, NULL, NULL), tm_mixed((int[]){3, 3, 3}, tm_warp, &w), -1);
 }
 
+static void move(double xyz[3], const void *data)
+{
+  for (int c = 0; c < 3; c++) xyz[c] += *(const double *)data;
+}
+
+/* Vertices are rounded there, volumes are not computed from them. */
+static void volumes_hold_far_from_the_origin(void)
+{
+  for (double by = 1e3; by < 1e10; by *= 1e3) {
+    tm_mesh *a = tm_benchmark(4, 0.7, 0.3, 0.6), *b = tm_benchmark(3, 0.1, 0, 1);
+
+    tm_move(a, move, &by);
+    tm_move(b, move, &by);
+    super s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    if (RT_EQ(s.status, REMAP_OK)) {
+      RT_EQ(rm_cells_check(s.cells), REMAP_OK);
+      super_check_volumes(&s);
+    }
+    laid_free(s.l);
+    tm_free(a);
+    tm_free(b);
+  }
+}
+
 /* ---- booleans ----------------------------------------------------------------------------------------------------------------------- */
 
 static const int every_keep[] = {RM_CELLS_IN_BOTH, RM_CELLS_IN_SOURCE, RM_CELLS_IN_TARGET, RM_CELLS_WHOLE_SOURCE, RM_CELLS_UNION};
@@ -351,7 +375,7 @@ RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(child
         RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
         RT_CASE(a_layer_without_thickness), RT_CASE(two_layers_without_thickness), RT_CASE(a_box_within_a_box),
         RT_CASE(a_box_through_a_face), RT_CASE(a_box_on_a_face_from_inside), RT_CASE(a_box_on_a_face_from_outside),
-        RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(operations_add_up),
+        RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(volumes_hold_far_from_the_origin), RT_CASE(operations_add_up),
         RT_CASE(identical_operands_are_their_union_and_leave_no_difference), RT_CASE(operands_with_one_skin_leave_no_difference),
         RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
         RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),

@@ -41,7 +41,7 @@ static inline void super_area_vector_(const rm_cells *m, rm_lid f, double out[3]
 }
 
 /* Volumes by pair are those of the moments, and there are no other pairs. */
-static inline void super_volumes_are_right_(const super *s)
+static inline void super_check_volumes(const super *s)
 {
   const laid       *l = s->l;
   const rm_moments *p = l->moments;
@@ -173,7 +173,7 @@ static inline void super_check(const super *s, int odd_cells, bool coarse)
     return;
   }
   RT_EQ(rm_cells_check(s->cells), REMAP_OK);
-  super_volumes_are_right_(s);
+  super_check_volumes(s);
   super_faces_are_covered_(s);
   if (coarse) super_edges_are_whole_(s);
   super_cells_are_manifold_(s, odd_cells);

@@ -32,7 +32,7 @@ typedef struct rm_cells {
   const rm_lid (*face_cell)[2];     /* [num_faces] owner, neighbour or RM_OUTSIDE                                             */
   const rm_lid (*face_triangle)[2]; /* [num_faces] triangle of mesh 1 and of mesh 2 it lies in, -1 (of several: the first)    */
   const rm_lid (*cell_ancestor)[2]; /* [num_cells] cells of part->piece[0] and [1], RM_OUTSIDE                                */
-  const double  *cell_volume;       /* [num_cells]                                                                            */
+  const double  *cell_volume;       /* [num_cells] of the exact cell, not of its rounded vertices                             */
 } rm_cells;
 
 /* Build the cells whose ancestors `keep` names (RM_CELLS_ bits). Pieces of one original face between the same two cells become one

@@ -36,6 +36,7 @@ typedef struct rm_limit {
   rm_lid            num_spots;
   const rm_spot    *spot;            /* [num_spots] those of mesh 1's vertices, of mesh 2's, of crossings      */
   const double    (*xyz)[3];         /* [num_spots] rounded                                                    */
+  const double    (*low)[3];         /* [num_spots] what rounding took from xyz: volumes far from the origin need it */
   const double     *error;           /* [num_spots] bound of the error of each coordinate                      */
   const rm_lid     *vertex_spot[2];  /* [side][num_vertices]                                                   */
   const rm_lid     *crossing_spot[2]; /* [side][crossings of its edges]                                        */

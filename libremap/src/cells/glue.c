@@ -148,15 +148,22 @@ static remap_status join_sides(work *w)
 
 static inline double largest(const double x[3]) { return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))); }
 
-/* Six times the volume of the cone from o over a polygon; if noise is not NULL, a bound of its error is added to *noise. */
-static double cone(const work *w, const rm_polygon *g, const double o[3], double *noise)
+/* From spot o to spot p, as if both had not been rounded. */
+static inline void between(const rm_limit *l, rm_lid o, rm_lid p, double out[3])
+{
+  for (int k = 0; k < 3; k++) out[k] = (l->xyz[p][k] - l->xyz[o][k]) + (l->low[p][k] - l->low[o][k]);
+}
+
+/* Six times the volume of the cone from spot o over a polygon; if noise is not NULL, a bound of its error is added to *noise. */
+static double cone(const work *w, const rm_polygon *g, rm_lid o, double *noise)
 {
   const rm_lid *v = w->p->vertex + g->first;
   double        a[3], b[3], c[3], sum = 0;
 
-  for (int k = 0; k < 3; k++) a[k] = w->l->xyz[v[0]][k] - o[k], b[k] = w->l->xyz[v[1]][k] - o[k];
+  between(w->l, o, v[0], a);
+  between(w->l, o, v[1], b);
   for (rm_lid i = 2; i < rm_polygon_size(g); i++) {
-    for (int k = 0; k < 3; k++) c[k] = w->l->xyz[v[i]][k] - o[k];
+    between(w->l, o, v[i], c);
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
     const double reach = noise ? fmax(largest(a), fmax(largest(b), largest(c))) : 0;
     if (noise) *noise += reach * reach * (0x1p-46 * reach + 16 * (w->l->error[v[0]] + w->l->error[v[i - 1]] + w->l->error[v[i]]));
@@ -196,9 +203,10 @@ typedef struct shells {
   bool     *is_void; /* winds the other way, beyond rounding */
 } shells;
 
-static const double *origin_of(const work *w, const shells *s, rm_lid shell)
+/* A vertex of the shell. */
+static rm_lid origin_of(const work *w, const shells *s, rm_lid shell)
 {
-  return w->l->xyz[w->p->vertex[w->p->polygon[s->first_side[shell] / 2].first]];
+  return w->p->vertex[w->p->polygon[s->first_side[shell] / 2].first];
 }
 
 static remap_status collect_shells(work *w, shells *s)
@@ -240,7 +248,7 @@ static remap_status collect_shells(work *w, shells *s)
 /* The shell among those of ids list[0..n) that winds about a vertex of the void. */
 static rm_lid shell_around(const work *w, const shells *s, rm_lid hollow, const rm_keyed *list, int64_t n)
 {
-  const double *o    = origin_of(w, s, hollow);
+  const double *o    = w->l->xyz[origin_of(w, s, hollow)];
   rm_lid        best = -1;
   double        most = 0;
 

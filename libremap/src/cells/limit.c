@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "geom/expansion.h"
 
 /* An edge of mesh 1 and one of mesh 2 that cross inside both. */
 typedef struct edge_contact {
@@ -356,11 +357,12 @@ static remap_status crossing_spots(builder *b, int side)
 
 static remap_status coordinates(builder *b)
 {
-  double(*xyz)[3], *error;
+  double (*xyz)[3], (*low)[3], *error;
   rm_spot *spot;
 
   RM_NEW(spot, b->arena, b->l->num_spots);
   RM_NEW(xyz, b->arena, b->l->num_spots);
+  RM_NEW0(low, b->arena, b->l->num_spots);
   RM_NEW(error, b->arena, b->l->num_spots);
   for (rm_lid p = 0; p < b->l->num_spots; p++) {
     double line[2][3], plane[3][3], size = 0, reach = 0;
@@ -374,7 +376,9 @@ static remap_status coordinates(builder *b)
     const double lambda = rm_crossing_parameter(line[0], line[1], plane[0], plane[1], plane[2]);
     for (int c = 0; c < 3; c++) {
       const double u = line[1][c] - line[0][c];
-      xyz[p][c] = line[0][c] + lambda * u;
+      const rm_dd  x = rm_two_sum(line[0][c], lambda * u);
+      xyz[p][c] = x.hi;
+      low[p][c] = x.lo;
       size      = fmax(size, fabs(u));
       reach     = fmax(reach, fmax(fabs(line[0][c]), fabs(line[1][c])));
     }
@@ -382,6 +386,7 @@ static remap_status coordinates(builder *b)
   }
   b->l->spot  = spot;
   b->l->xyz   = (const double (*)[3])xyz;
+  b->l->low   = (const double (*)[3])low;
   b->l->error = error;
   return REMAP_OK;
 }
