@@ -201,6 +201,8 @@ typedef struct shells {
   rm_label *label;
   double   *volume;
   bool     *is_void; /* winds the other way, beyond rounding */
+  double  (*box)[6]; /* these only if there are voids */
+  rm_lid   *side_offset, *side;
 } shells;
 
 /* A vertex of the shell. */
@@ -245,22 +247,63 @@ static remap_status collect_shells(work *w, shells *s)
   return REMAP_OK;
 }
 
-/* The shell among those of ids list[0..n) that winds about a vertex of the void. */
+/* Boxes of all shells, and the sides of each. */
+static remap_status file_sides(work *w, shells *s)
+{
+  const rm_lid sides = (rm_lid)(2 * w->p->num);
+
+  RM_NEW(s->box, w->scratch, s->num);
+  RM_NEW0(s->side_offset, w->scratch, (int64_t)s->num + 2);
+  RM_NEW(s->side, w->scratch, sides);
+  for (rm_lid k = 0; k < s->num; k++)
+    for (int c = 0; c < 3; c++) s->box[k][c] = INFINITY, s->box[k][c + 3] = -INFINITY;
+  for (rm_lid side = 0; side < sides; side++) {
+    const rm_polygon *g = &w->p->polygon[side / 2];
+    if (s->of[side] < 0) continue;
+    s->side_offset[s->of[side] + 2]++;
+    for (int64_t k = g[0].first; k < g[1].first; k++)
+      for (int c = 0; c < 3; c++) {
+        double      *box = s->box[s->of[side]];
+        const double x   = w->l->xyz[w->p->vertex[k]][c];
+        box[c] = x < box[c] ? x : box[c], box[c + 3] = x > box[c + 3] ? x : box[c + 3];
+      }
+  }
+  for (rm_lid k = 0; k < s->num; k++) s->side_offset[k + 2] += s->side_offset[k + 1];
+  for (rm_lid side = 0; side < sides; side++)
+    if (s->of[side] >= 0) s->side[s->side_offset[s->of[side] + 1]++] = side;
+  return REMAP_OK;
+}
+
+/* How often shell x winds about a point, times 4 pi. */
+static double winding(const work *w, const shells *s, rm_lid x, const double p[3])
+{
+  double angle = 0;
+
+  for (rm_lid k = s->side_offset[x]; k < s->side_offset[x + 1]; k++)
+    angle += (s->side[k] & 1 ? -1 : 1) * solid_angle(w, &w->p->polygon[s->side[k] / 2], p);
+  return angle;
+}
+
+/* The solid shell among list[0..n) around a void: the only one whose box holds a vertex of it, or else the one that winds about that
+ * the most. */
 static rm_lid shell_around(const work *w, const shells *s, rm_lid hollow, const rm_keyed *list, int64_t n)
 {
-  const double *o    = w->l->xyz[origin_of(w, s, hollow)];
+  const double *p = w->l->xyz[origin_of(w, s, hollow)], at[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};
   rm_lid        best = -1;
-  double        most = 0;
+  double        most = NAN; /* of the best one, if it is known */
 
   for (int64_t k = 0; k < n; k++) {
     const rm_lid x = (rm_lid)list[k].item;
-    double       angle = 0;
-    if (s->is_void[x]) continue;
-    for (rm_lid side = 0; side < 2 * w->p->num; side++)
-      if (s->of[side] == x) angle += (side & 1 ? -1 : 1) * solid_angle(w, &w->p->polygon[side / 2], o);
-    if (best < 0 || angle > most) best = x, most = angle;
+    if (s->is_void[x] || !rm_box_meets(s->box[x], at)) continue;
+    if (best >= 0) {
+      const double angle = winding(w, s, x, p);
+      if (isnan(most)) most = winding(w, s, best, p);
+      if (angle <= most) continue;
+      most = angle;
+    }
+    best = x;
   }
-  return best;
+  return best >= 0 ? best : hollow;
 }
 
 static remap_status place_voids(work *w, shells *s)
@@ -270,18 +313,16 @@ static remap_status place_voids(work *w, shells *s)
 
   for (rm_lid k = 0; k < s->num; k++) any = any || s->is_void[k];
   if (!any) return REMAP_OK;
+  RM_TRY(file_sides(w, s));
   RM_NEW(key, w->scratch, s->num);
   RM_NEW(spare, w->scratch, s->num);
   for (rm_lid k = 0; k < s->num; k++) key[k] = (rm_keyed){label_key(s->label[k]), k};
   rm_sort_keyed(key, spare, s->num);
   for (int64_t k = 0, next; k < s->num; k = next) {
-    rm_lid solid = 0, last = -1;
-    for (next = k; next < s->num && key[next].key == key[k].key; next++)
-      if (!s->is_void[key[next].item]) solid++, last = (rm_lid)key[next].item;
-    for (int64_t i = k; i < next; i++) {
+    for (next = k + 1; next < s->num && key[next].key == key[k].key;) next++;
+    for (int64_t i = k; i < next && next > k + 1; i++) {
       const rm_lid x = (rm_lid)key[i].item;
-      if (!s->is_void[x] || solid == 0) continue;
-      s->inside[x] = solid == 1 ? last : shell_around(w, s, x, key + k, next - k);
+      if (s->is_void[x]) s->inside[x] = shell_around(w, s, x, key + k, next - k);
     }
   }
   return REMAP_OK;
