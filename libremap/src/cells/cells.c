@@ -7,6 +7,7 @@
 
 typedef struct work {
   rm_arena        *arena, *scratch;
+  rm_arena        *limit_arena; /* of l; dropped when the vertices are out */
   const rm_part   *part;
   const rm_limit  *l;
   rm_polygons      p;
@@ -22,7 +23,7 @@ typedef struct work {
 static remap_status make_polygons(work *w, const rm_overlay *o, rm_reason *reason)
 {
   rm_arena    *passing = rm_arena_new();
-  remap_status status  = passing ? rm_limit_build(w->scratch, passing, w->part, o, &w->l, reason) : REMAP_NO_MEMORY;
+  remap_status status  = passing ? rm_limit_build(w->limit_arena, passing, w->part, o, &w->l, reason) : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = rm_polygons_build(w->part, w->l, &w->p, reason);
   rm_arena_drop(passing);
@@ -38,7 +39,7 @@ static remap_status make_cells(work *w, rm_reason *reason)
   if (status == REMAP_OK) status = rm_glue(w->scratch, w->l, &w->p, &arcs, &w->glued);
   if (status == REMAP_BAD_MESH)
     rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap");
-  if (status == REMAP_OK) status = rm_faces_build(w->scratch, w->l, &w->p, &arcs, &w->glued, &w->faces);
+  if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued, &w->faces);
   rm_arena_drop(passing);
   return status;
 }
@@ -178,6 +179,9 @@ static remap_status make_faces(work *w)
     memcpy(xyz[n], w->l->xyz[s], sizeof *xyz);
     new_vertex[s] = n++;
   }
+  rm_arena_drop(w->limit_arena);
+  w->limit_arena = NULL;
+  w->l           = NULL;
   r.new_vertex = new_vertex;
   RM_NEW(r.offset, w->arena, (int64_t)out->num_faces + 1);
   RM_NEW(r.vertex, w->arena, t.corners);
@@ -196,9 +200,11 @@ static remap_status make_faces(work *w)
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int keep, const rm_cells **out,
                             rm_reason *reason)
 {
-  work         w      = {.arena = arena, .scratch = rm_arena_new(), .part = part, .out = rm_arena_zero(arena, 1, sizeof(rm_cells))};
-  remap_status status = w.scratch && w.out ? REMAP_OK : REMAP_NO_MEMORY;
+  work         w      = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part};
+  remap_status status = w.scratch && w.limit_arena ? REMAP_OK : REMAP_NO_MEMORY;
 
+  w.out = rm_arena_zero(arena, 1, sizeof *w.out);
+  if (!w.out) status = REMAP_NO_MEMORY;
   if (status == REMAP_OK) status = make_polygons(&w, overlay, reason);
   if (status == REMAP_OK) status = make_cells(&w, reason);
   if (status == REMAP_OK) status = select_cells(&w, keep);
@@ -206,6 +212,7 @@ remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overl
   free(w.p.polygon);
   free(w.p.vertex);
   rm_arena_drop(w.scratch);
+  rm_arena_drop(w.limit_arena);
   if (status == REMAP_OK) *out = w.out;
   return status;
 }

@@ -185,9 +185,9 @@ typedef struct rm_faces {
   rm_lid        *next;   /* scratch of rm_face_loop, [num_spots]                        */
 } rm_faces;
 
-/* Group coplanar pieces of one face between the same two cells. Lives in arena. */
-remap_status rm_faces_build(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, const rm_glued *glued,
-                            rm_faces *out);
+/* Group coplanar pieces of one face between the same two cells. Lives in arena; passing is for what is not kept. */
+remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs,
+                            const rm_glued *glued, rm_faces *out);
 /* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself nowhere: its
  * members then are faces as they are. */
 rm_lid rm_face_loop(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t k, rm_lid *loop);

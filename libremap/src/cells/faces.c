@@ -53,14 +53,14 @@ static void join_pieces(const rm_limit *l, const rm_polygons *p, const rm_arcs *
     }
 }
 
-remap_status rm_faces_build(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, const rm_glued *glued,
-                            rm_faces *out)
+remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs,
+                            const rm_glued *glued, rm_faces *out)
 {
   rm_lid  *parent, *member;
   int64_t *offset;
   uint8_t *inner;
 
-  RM_NEW(parent, arena, p->num);
+  RM_NEW(parent, passing, p->num);
   RM_NEW(member, arena, p->num);
   RM_NEW0(offset, arena, p->num + 2);
   RM_NEW0(inner, arena, p->num_vertices);
