@@ -370,6 +370,28 @@ static void which_mesh_is_the_source_moves_no_vertex(void)
   }
 }
 
+static void memory_that_runs_out_is_told(void)
+{
+  tm_mesh     *a = boxes(&two, &two, &two, NULL), *b = boxes(&shifted, &two, &four, NULL);
+  laid        *l = laid_over(a, b, REMAP_FACES_CENTRE, NULL);
+  remap_status status = REMAP_NO_MEMORY;
+  int64_t      n      = 0;
+
+  while (status == REMAP_NO_MEMORY && n < 100) {
+    rm_arena       *arena = rm_arena_new();
+    const rm_cells *cells = NULL;
+    rm_arena_fail_at(arena, ++n);
+    status = rm_cells_build(arena, &l->part, l->overlay, RM_CELLS_UNION, &cells, NULL);
+    RT_CHECK((cells != NULL) == (status == REMAP_OK));
+    rm_arena_drop(arena);
+  }
+  RT_EQ(status, REMAP_OK);
+  RT_CHECK(n > 5);
+  laid_free(l);
+  tm_free(a);
+  tm_free(b);
+}
+
 RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents), RT_CASE(a_box_around_all),
         RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut), RT_CASE(boxes_that_abut_askew),
         RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
@@ -381,4 +403,4 @@ RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(child
         RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),
         RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused),
         RT_CASE(numbering_and_senders_change_no_bit),
-        RT_CASE(which_mesh_is_the_source_moves_no_vertex))
+        RT_CASE(which_mesh_is_the_source_moves_no_vertex), RT_CASE(memory_that_runs_out_is_told))
