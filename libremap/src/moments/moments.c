@@ -157,6 +157,62 @@ INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_
   }
 }
 
+/* Point k of an edge of `mesh`, where its piece k begins and its piece k - 1 ends. */
+INLINE point piece_point(const work *w, int mesh, rm_lid e, rm_lid k)
+{
+  const rm_trimesh *m  = w->o->mesh[mesh];
+  const rm_trace   *tr = &w->o->trace[mesh];
+
+  if (k == 0) return vertex_point(w, m, m->edge[e][0]);
+  if (k > tr->count[e]) return vertex_point(w, m, m->edge[e][1]);
+  return crossing_point(w, mesh, &tr->crossing[tr->first[e] + k - 1]);
+}
+
+INLINE rm_lid piece_state(const rm_trace *tr, rm_lid e, rm_lid k)
+{
+  return k == 0 ? tr->state[e] : tr->crossing[tr->first[e] + k - 1].state;
+}
+
+/* How often a cell winds about piece k of an edge. */
+INLINE int piece_number(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell)
+{
+  const rm_lid state = piece_state(tr, e, k);
+
+  if (state >= RM_OUTSIDE) return state == cell;
+  for (rm_lid z = tr->list_offset[-2 - state]; z < tr->list_offset[-1 - state]; z++)
+    if (tr->winding[z].cell == cell) return tr->winding[z].number;
+  return 0;
+}
+
+/* Pieces of an edge about which a cell winds equally often count as one: what cuts them are other cells that overlap this one, and
+ * another rank need not have those. The number of the first piece behind those that begin with piece k; k if they began before. */
+INLINE rm_lid run_end(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell, int number)
+{
+  if (k > 0 && piece_number(tr, e, k - 1, cell) == number) return k;
+  do k++;
+  while (k <= tr->count[e] && piece_number(tr, e, k, cell) == number);
+  return k;
+}
+
+/* Piece k of edge e, and those behind it that count as one with it, where cells overlap. */
+static void tangled_pieces(work *w, rm_lid i, const plane *pt, rm_lid e, rm_lid k, int kind, double sign, sink *add_side)
+{
+  const rm_trace   *tr    = &w->o->trace[0];
+  const rm_lid      state = piece_state(tr, e, k);
+  const rm_winding  one   = {state, 1};
+  const rm_winding *list  = state < RM_OUTSIDE ? tr->winding + tr->list_offset[-2 - state] : &one;
+  const rm_lid      n     = state < RM_OUTSIDE ? tr->list_offset[-1 - state] - tr->list_offset[-2 - state] : state >= 0;
+  const point       p     = piece_point(w, 0, e, k);
+
+  for (rm_lid z = 0; z < n; z++) {
+    const rm_lid in[2] = {list[z].cell, RM_OUTSIDE}, end = run_end(tr, e, k, in[0], list[z].number);
+
+    if (end == k) continue;
+    const point q = piece_point(w, 0, e, end);
+    add_side(w, i, in, kind, sign * list[z].number, pt, &p, &q);
+  }
+}
+
 /* Pieces of the edges of triangle t, which bound its polygons in the cells of mesh 2. */
 INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *add_side)
 {
@@ -167,21 +223,20 @@ INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *ad
   for (int h = 0; h < 3; h++) {
     const rm_lid e = m->triangle_edge[pt->triangle][h], count = tr->count[e];
     const double s = h == 2 ? -g : g;
+    rm_lid       before = RM_OUTSIDE, in[2] = {tr->state[e], RM_OUTSIDE};
     point        p = vertex_point(w, m, m->edge[e][0]);
-    rm_lid       in[2] = {tr->state[e], RM_OUTSIDE};
 
     for (rm_lid k = 0; k <= count; k++) {
-      const rm_crossing *x = &tr->crossing[tr->first[e] + k];
-      const point        q = k == count ? vertex_point(w, m, m->edge[e][1]) : crossing_point(w, 0, x);
+      const rm_lid next = k < count ? tr->crossing[tr->first[e] + k].state : RM_OUTSIDE;
+      const point  q    = piece_point(w, 0, e, k + 1);
 
-      if (in[0] >= RM_OUTSIDE) {
+      if (before < RM_OUTSIDE || in[0] < RM_OUTSIDE || next < RM_OUTSIDE || (in[0] >= 0 && (in[0] == before || in[0] == next)))
+        tangled_pieces(w, i, pt, e, k, kind, s, add_side);
+      else
         add_side(w, i, in, kind, s, pt, &p, &q);
-      } else {
-        for (rm_lid z = tr->list_offset[-2 - in[0]]; z < tr->list_offset[-1 - in[0]]; z++)
-          add_side(w, i, (rm_lid[2]){tr->winding[z].cell, RM_OUTSIDE}, kind, s * tr->winding[z].number, pt, &p, &q);
-      }
-      p = q;
-      if (k < count) in[0] = x->state;
+      p      = q;
+      before = in[0];
+      in[0]  = next;
     }
   }
 }
@@ -193,16 +248,12 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
   const rm_trace   *tr = &w->o->trace[1];
 
   for (int64_t k = w->piece_offset[i]; k < w->piece_offset[i + 1]; k++) {
-    const rm_lid       f = w->piece[k][0], at = w->piece[k][1];
-    const rm_crossing *x = &tr->crossing[tr->first[f] + at];
-    const point        p = at == 0 ? vertex_point(w, m, m->edge[f][0]) : crossing_point(w, 1, x - 1);
-    const point        q = at == tr->count[f] ? vertex_point(w, m, m->edge[f][1]) : crossing_point(w, 1, x);
-    const rm_lid       state  = at == 0 ? tr->state[f] : x[-1].state;
-    double             number = 1;
+    const rm_lid f = w->piece[k][0], at = w->piece[k][1];
+    const int    number = piece_number(tr, f, at, i);
+    const rm_lid end    = run_end(tr, f, at, i, number);
 
-    if (state < RM_OUTSIDE)
-      for (rm_lid z = tr->list_offset[-2 - state]; z < tr->list_offset[-1 - state]; z++)
-        if (tr->winding[z].cell == i) number = tr->winding[z].number;
+    if (end == at) continue;
+    const point p = piece_point(w, 1, f, at), q = piece_point(w, 1, f, end);
     for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
       const rm_lid b  = m->star[z] / 4;
       const plane  pb = plane_of(w, 1, b);
