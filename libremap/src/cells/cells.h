@@ -37,8 +37,8 @@ typedef struct rm_cells {
 
 /* Build the cells whose ancestors `keep` names (RM_CELLS_ bits). Pieces of one original face between the same two cells become one
  * polygon where they are coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in
- * arena. BAD_MESH with the reason if cells of one mesh overlap or cross each other: a supermesh needs meshes without.
- * O(n log n) in crossings. */
+ * arena. BAD_MESH with the reason if cells of one mesh overlap or cross each other, or if a triangle of a face has no area: a
+ * supermesh needs meshes without. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int keep, const rm_cells **out,
                             rm_reason *reason);
 

@@ -28,7 +28,7 @@ typedef struct rm_spot {
 } rm_spot;
 
 /* The limit of the overlay. Triangles of a mesh that lie on each other count as the first of them, with the sides that are left
- * when cells on both sides of the stack cancel. A triangle without area, or whose sides all cancel, is absent. */
+ * when cells on both sides of the stack cancel. A triangle whose sides all cancel is absent. */
 typedef struct rm_limit {
   const rm_overlay *o;
   const rm_lid     *first_copy[2];   /* [side][num_triangles]                                                  */
