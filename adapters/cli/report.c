@@ -118,16 +118,37 @@ static json_t *real(double value)
   return number ? number : json_null();
 }
 
+/* A text; one that is not UTF-8, as names of files and fields may be, is read as Latin 1. NULL becomes null. */
+static json_t *words(const char *text)
+{
+  json_t *string = text ? json_string(text) : json_null();
+  char   *utf8;
+  size_t  n = 0;
+
+  if (string || !(utf8 = malloc(2 * strlen(text) + 1))) return string;
+  for (; *text; text++) {
+    const unsigned byte = (unsigned char)*text;
+
+    if (byte >= 0x80) utf8[n++] = (char)(0xC0 | byte >> 6);
+    utf8[n++] = (char)(byte >= 0x80 ? 0x80 | (byte & 0x3F) : byte);
+  }
+  utf8[n] = '\0';
+  string  = json_string(utf8);
+  free(utf8);
+  return string;
+}
+
 static json_t *side_json(const cli_report *report, remap_side side)
 {
   const rcgns_info *info  = report->info[side];
   const int64_t     worst = report->stats.worst_inverted_cell[side];
   char              cell[256];
 
-  return json_pack("{s:s, s:I, s:I, s:o, s:I, s:s?, s:s?}", "file", info->path, "zones", (json_int_t)info->num_zones, "cells",
-                   (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "inverted_cells",
+  return json_pack("{s:o, s:I, s:I, s:o, s:I, s:o, s:o}", "file", words(info->path), "zones", (json_int_t)info->num_zones,
+                   "cells", (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "inverted_cells",
                    (json_int_t)report->stats.inverted_cells[side], "worst_inverted_cell",
-                   worst < 0 ? NULL : cell_words(info, worst, cell, sizeof cell), "solution", report->solution[side]);
+                   words(worst < 0 ? NULL : cell_words(info, worst, cell, sizeof cell)), "solution",
+                   words(report->solution[side]));
 }
 
 static json_t *overlap_json(const remap_stats *stats)
@@ -155,7 +176,7 @@ static json_t *field_json(const cli_field_row *row)
 {
   const remap_field_report *what = &row->what;
 
-  return json_pack("{s:s, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I}", "name", row->name, "nature",
+  return json_pack("{s:o, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I}", "name", words(row->name), "nature",
                    nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter), "source_integral",
                    real(what->source_integral), "target_integral", real(what->target_integral), "conservation_error",
                    real(what->conservation_error), "source_min", real(what->source_min), "source_max", real(what->source_max),
@@ -170,7 +191,7 @@ static json_t *report_json(const cli_report *report)
   json_t            *fields = json_array(), *notes = json_array();
 
   for (int i = 0; i < report->num_fields; i++) json_array_append_new(fields, field_json(&report->field[i]));
-  for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, json_string(report->note[i]));
+  for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, words(report->note[i]));
   return json_pack("{s:s, s:i, s:o, s:o, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version", remap_version(),
                    "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target", side_json(report, REMAP_TARGET),
                    "overlap", overlap_json(stats), "fields", fields, "time", "read", real(report->seconds_read), "partition",

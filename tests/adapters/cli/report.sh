@@ -108,6 +108,13 @@ ln -s behind.json link.json
 works 1 good.cgns mesh.cgns -q -o out.cgns --report link.json && [ -L link.json ] && grep -q '"peak_rss_bytes_max"' behind.json
 hold $? "a report goes through a link and leaves the link"
 
+name=$(printf 'm\351lange') # Latin 1
+cp good.cgns "$name.cgns"
+works 1 "$name.cgns" mesh.cgns -o one.cgns --report report.json --output-solution "$name"
+is "$(printf 'm\303\251lange').cgns" source file
+is "$(printf 'm\303\251lange')" target solution
+hold "$wrong" "names that are not UTF-8 are reported"
+
 "$tools/make_demo" . 10 >/dev/null || complain "no demo"
 for n in 1 2 3; do works "$n" source.cgns target.cgns -o "out$n.cgns" --report "report$n.json"; done
 cmp out1.cgns out2.cgns || complain "1 and 2 ranks differ"
