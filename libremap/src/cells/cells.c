@@ -38,7 +38,7 @@ static remap_status make_cells(work *w, rm_reason *reason)
 
   if (status == REMAP_OK) status = rm_glue(w->scratch, w->l, &w->p, &arcs, &w->glued);
   if (status == REMAP_BAD_MESH)
-    rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap");
+    rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap or are inverted");
   if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued, &w->faces);
   rm_arena_drop(passing);
   return status;

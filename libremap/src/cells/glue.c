@@ -339,11 +339,13 @@ static remap_status number_cells(work *w, shells *s, rm_glued *out)
   RM_NEW(label, w->arena, s->num);
   RM_NEW0(volume, w->arena, s->num);
   out->num_cells = 0;
-  for (rm_lid k = 0; k < s->num; k++)
+  for (rm_lid k = 0; k < s->num; k++) {
+    if (s->is_void[k] && s->inside[k] == k) return REMAP_BAD_MESH; /* a void in nothing: an inverted cell */
     if (s->inside[k] == k) {
       label[out->num_cells] = s->label[k];
       cell_of[k]            = out->num_cells++;
     }
+  }
   for (rm_lid k = 0; k < s->num; k++) {
     cell_of[k] = cell_of[s->inside[k]];
     volume[cell_of[k]] += s->volume[k];
