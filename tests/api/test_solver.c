@@ -219,6 +219,28 @@ static void what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement(v
   close_world(&w);
 }
 
+static void a_first_transfer_that_one_rank_gets_wrong_fails_on_all(void)
+{
+  world w;
+
+  if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 9)) {
+    double                *v       = tm_alloc_(w.cells[1], sizeof *v);
+    const remap_field_desc f       = {.name = "rho", .nature = REMAP_CONSERVED, .in = w.u[0], .out = v};
+    const bool             is_last = rt_rank() == rt_size() - 1;
+    remap_transfer         how     = nearest();
+
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, is_last ? NULL : &f, NULL), REMAP_BAD_ARGUMENT);
+    RT_CHECK(strstr(remap_message(w.ctx), "fields is NULL") != NULL);
+    if (is_last) how.order = 99;
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_BAD_ARGUMENT);
+    RT_CHECK(strstr(remap_message(w.ctx), "order 99") != NULL);
+    how = nearest();
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
+    free(v);
+  }
+  close_world(&w);
+}
+
 static void transfers_that_differ_between_ranks_are_refused_where_they_meet(void)
 {
   world w;
@@ -475,6 +497,7 @@ RT_MAIN(RT_CASE(halves_make_the_same_as_a_whole_in_both_directions_at_once),
         RT_CASE(halves_out_of_order_are_refused_and_a_context_may_end_between_them), RT_CASE(transfers_after_the_first_take_no_memory),
         RT_CASE(ranks_without_cells_take_no_part_after_the_first_transfer),
         RT_CASE(what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement),
+        RT_CASE(a_first_transfer_that_one_rank_gets_wrong_fails_on_all),
         RT_CASE(transfers_that_differ_between_ranks_are_refused_where_they_meet), RT_CASE(strides_and_places_leave_the_rest_alone),
         RT_CASE(blocks_with_indices_of_any_kind_make_the_same_bits_as_one_mesh), RT_CASE(masked_cells_are_as_good_as_not_there),
         RT_CASE(contexts_do_not_know_of_each_other))

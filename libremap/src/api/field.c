@@ -165,12 +165,19 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
   return REMAP_OK;
 }
 
+/* The first transfer in a direction is collective: ranks that pass sound arguments wait for the others' word. */
+static bool is_first(const remap_context *ctx, remap_direction direction)
+{
+  return (direction == REMAP_FORWARD || direction == REMAP_BACKWARD) && !ctx->carrier[direction];
+}
+
 static remap_status start(remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
                           const remap_field_desc *fields, rm_reason *reason)
 {
-  remap_status mine;
+  remap_status mine = check_agreed(ctx, direction, how, num_fields, fields, reason);
 
-  RM_TRY(check_agreed(ctx, direction, how, num_fields, fields, reason));
+  if (mine == REMAP_BAD_ARGUMENT && is_first(ctx, direction)) return rm_comm_agree_reason(&ctx->comm, mine, reason);
+  RM_TRY(mine);
   const rm_transfer_setup setup = setup_of(ctx, direction, false);
   const rm_load           load  = rm_load_of(&setup, how, num_fields, fields);
   const uint64_t          mark  = mark_of(direction, how, num_fields, fields);
