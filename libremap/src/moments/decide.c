@@ -110,6 +110,53 @@ static void homogeneous(const rm_overlay *o, const corner *c, const double *vert
 
 static bool is_same(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
 
+/* ---- polygons, found by pair and triangle ---------------------------------------------------------------------------------- */
+
+enum { FEW_BUCKETS = 256 };
+
+static int bucket_of(const work *w, rm_lid target, int mesh, rm_lid triangle)
+{
+  const uint64_t key = (uint64_t)(uint32_t)target << 32 | (uint32_t)(2 * triangle + mesh);
+  return (int)(rm_hash_word(key) & (uint64_t)(w->num_buckets - 1));
+}
+
+static remap_status set_buckets(work *w, int num)
+{
+  RM_TRY(rm_grow(&w->bucket, &w->bucket_room, num, sizeof *w->bucket));
+  w->num_buckets = num;
+  for (int b = 0; b < num; b++) w->bucket[b] = -1;
+  for (int k = 0; k < w->num_polygons; k++) {
+    int *bucket = &w->bucket[bucket_of(w, w->polygon[k].target, w->polygon[k].mesh, w->polygon[k].triangle)];
+    w->polygon[k].chain = *bucket;
+    *bucket             = k;
+  }
+  return REMAP_OK;
+}
+
+remap_status rm_moments_no_polygons(work *w)
+{
+  w->num_polygons = w->num_corners = 0;
+  return set_buckets(w, FEW_BUCKETS);
+}
+
+/* The polygon of a pair in a plane, a new one if it has none yet. NULL: w->status tells. */
+static polygon *find_polygon(work *w, slot *s, const plane *pl)
+{
+  polygon *g;
+
+  for (int k = w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)]; k >= 0; k = w->polygon[k].chain) {
+    g = &w->polygon[k];
+    if (g->triangle == pl->triangle && g->mesh == pl->mesh && g->target == s->target) return g;
+  }
+  if (w->num_polygons == w->num_buckets && (w->status = set_buckets(w, 4 * w->num_buckets)) != REMAP_OK) return NULL;
+  if ((w->status = rm_grow(&w->polygon, &w->polygon_room, w->num_polygons + 1, sizeof *w->polygon)) != REMAP_OK) return NULL;
+  int *bucket = &w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)];
+  g           = &w->polygon[w->num_polygons];
+  *g = (polygon){.next = s->first_polygon, .chain = *bucket, .target = s->target, .mesh = pl->mesh, .triangle = pl->triangle, .first_corner = -1};
+  *bucket = s->first_polygon = w->num_polygons++;
+  return g;
+}
+
 /* The polygon's area, for pairs that are in doubt. */
 static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, const point *p, const point *q)
 {
@@ -117,23 +164,13 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
   const double *n = pl->n;
   const point  *start = sign > 0 ? p : q, *end = sign > 0 ? q : p; /* going round the polygon */
   double        a[3], b[3];
-  polygon      *g = NULL;
+  polygon      *g;
   corner       *c;
 
-  if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK) return;
-  for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next)
-    if (w->polygon[k].triangle == pl->triangle && w->polygon[k].mesh == pl->mesh) {
-      g = &w->polygon[k];
-      break;
-    }
+  if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK || !(g = find_polygon(w, s, pl))) return;
   relative(p, s->o, a);
   relative(q, s->o, b);
-  if (!g) {
-    if ((w->status = rm_grow(&w->polygon, &w->polygon_room, w->num_polygons + 1, sizeof *w->polygon)) != REMAP_OK) return;
-    g  = &w->polygon[w->num_polygons];
-    *g = (polygon){s->first_polygon, pl->mesh, pl->triangle, 0, -1, 0, {a[0], a[1], a[2]}, 0};
-    s->first_polygon = w->num_polygons++;
-  }
+  if (!g->num_cones) memcpy(g->first, a, sizeof g->first);
   for (int d = 0; d < 3; d++) {
     a[d] -= g->first[d];
     b[d] -= g->first[d];

@@ -407,7 +407,7 @@ static remap_status look_again(work *w, rm_lid i, bool sums, bool polygons)
         for (int c = 0; c < w->num_sums; c++) w->slots[k].sum[c] = w->exact[k][c].hi + w->exact[k][c].lo;
   }
   if (polygons) {
-    w->num_polygons = w->num_corners = 0;
+    RM_TRY(rm_moments_no_polygons(w));
     all_sides(w, i, rm_moments_add_polygon);
   }
   return w->status;
@@ -561,6 +561,7 @@ remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_ove
   free(w.slots);
   free(w.polygon);
   free(w.corner);
+  free(w.bucket);
   free(w.exact);
   free(w.source);
   free(w.target);

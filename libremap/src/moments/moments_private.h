@@ -57,6 +57,8 @@ typedef struct plane {
 /* One polygon of a pair, for the decision whether the pair has volume. */
 typedef struct polygon {
   int     next; /* of the same pair, -1 */
+  int     chain; /* next of the same bucket, -1 */
+  rm_lid  target; /* of the pair */
   int     mesh;
   rm_lid  triangle;
   int32_t num_cones;
@@ -99,6 +101,9 @@ typedef struct work {
   polygon          *polygon;
   int64_t           polygon_room;
   int               num_polygons;
+  int              *bucket; /* [num_buckets] first polygon of each hash value, -1 */
+  int64_t           bucket_room;
+  int               num_buckets;
   corner           *corner;
   int64_t           corner_room;
   int               num_corners;
@@ -122,6 +127,9 @@ INLINE void relative(const point *p, const double o[3], double out[3])
 {
   for (int c = 0; c < 3; c++) out[c] = (p->base[c] - o[c]) + p->delta[c];
 }
+
+/* Forget the polygons of the last source cell. */
+remap_status rm_moments_no_polygons(work *w);
 
 /* A sink that collects the polygons of pairs that want them. */
 sink rm_moments_add_polygon;
