@@ -2,6 +2,7 @@
  * scale has changed; so is its stencil, unless the frame has. O(n) for what is read. */
 #include "api/context.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- names -------------------------------------------------------------------------------------------------------- */
@@ -124,11 +125,14 @@ remap_status rm_context_read_meshes(remap_context *ctx, const bool moves[2], rm_
   remap_mesh given[2];
 
   RM_TRY(find_frame(ctx, is_read, passing, given, reason));
+  const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit; /* the same on all ranks */
+  if (!isnormal(cubed) || !isnormal(cubed * unit * unit))
+    return rm_fail(REMAP_BAD_MESH, reason, -1, -1, "the largest coordinate is about %.1g: volumes and moments are no doubles in this unit", unit);
   for (int side = 0; side < 2; side++) {
     if (is_read[side])
       RM_TRY(rm_mesh_build(ctx->mesh_arena[side], &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side],
                            reason));
-    RM_TRY(rm_comm_agree_reason(&ctx->comm, rm_context_progress(ctx, "reading of meshes", 0.5 * (side + 1)), reason));
+    RM_TRY(rm_comm_agree_reason(&ctx->comm, rm_context_progress(ctx, "checking of meshes", 0.5 * (side + 1)), reason));
   }
   return REMAP_OK;
 }

@@ -557,7 +557,7 @@ static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_e
           return REMAP_INCONSISTENT;
         }
         if (++done % STEP == 0 && progress && progress->call &&
-            progress->call(progress->user, t->moved > 0 ? "crossings of mesh 1" : "crossings of mesh 2", (double)done / m->num_edges))
+            progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges", (double)done / m->num_edges))
           return REMAP_CANCELLED;
       }
     }
