@@ -94,11 +94,10 @@ static bool has_old_value(const cli_job *j, const char *name)
 
 static void describe_field(cli_job *j, const rcgns_field *field)
 {
-  const int     k       = j->num_fields++;
-  const bool    slopes  = j->options.transfer.order > 1 && field->nature != REMAP_FLAG;
-  remap_limiter limiter = j->options.transfer.limiter;
+  const int           k       = j->num_fields++;
+  const bool          slopes  = j->options.transfer.order > 1 && field->nature != REMAP_FLAG;
+  const remap_limiter limiter = j->options.transfer.limiter;
 
-  if (limiter == REMAP_LIMITER_AUTO) limiter = REMAP_LIMITER_BARTH_JESPERSEN;
   j->field[k] = (remap_field_desc){.name = field->name, .nature = field->nature, .has_old = has_old_value(j, field->name)};
   j->row[k]   = (cli_field_row){.name = field->name, .nature = field->nature, .limiter = slopes ? limiter : REMAP_LIMITER_NONE};
   if (!field->nature_known && !field->is_integer)

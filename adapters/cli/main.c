@@ -63,8 +63,6 @@ static void collect_notes(cli_job *j)
 
     for (int64_t i = 0; i < info->num_notes; i++) cli_note(j, "%s: %s", info->path, info->note[i]);
   }
-  if (j->options.transfer.limiter == REMAP_LIMITER_AUTO && j->options.transfer.order > 1)
-    cli_note(j, "limiter auto: barth-jespersen");
 }
 
 /* ---- opening ------------------------------------------------------------------------------------------------------ */

@@ -23,8 +23,9 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
 /* Options: letter or 0, name, what its argument is called or NULL, what it does. A second line of help follows after \n. */
 #define OPTION_LIST(X)                                                                                                 \
   X(FIELDS, 'f', "fields", "LIST", "names or globs, comma separated; default every cell-centred field of SOURCE")      \
-  X(ORDER, 0, "order", "1|2", "accuracy of the transfer; default 2")                                                   \
-  X(LIMITER, 0, "limiter", "none|barth-jespersen|auto", "bounds on the slopes; auto, the default, is barth-jespersen") \
+  X(ORDER, 0, "order", "1|2|3", "accuracy of the transfer; default 2")                                                 \
+  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto",                                                           \
+    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                       \
   X(FACES, 0, "faces", "centre|diagonal", "how faces become triangles; default centre")                                \
   X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error",                                                  \
     "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                            \
@@ -71,9 +72,10 @@ typedef struct word {
   int         value;
 } word;
 
-static const word order_words[]     = {{"1", 1}, {"2", 2}, {NULL, 0}};
+static const word order_words[]     = {{"1", 1}, {"2", 2}, {"3", 3}, {NULL, 0}};
 static const word limiter_words[]   = {{"none", REMAP_LIMITER_NONE},
                                        {"barth-jespersen", REMAP_LIMITER_BARTH_JESPERSEN},
+                                       {"caas", REMAP_LIMITER_CAAS},
                                        {"auto", REMAP_LIMITER_AUTO},
                                        {NULL, 0}};
 static const word faces_words[]     = {{"centre", REMAP_FACES_CENTRE}, {"diagonal", REMAP_FACES_DIAGONAL}, {NULL, 0}};

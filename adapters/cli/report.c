@@ -176,12 +176,12 @@ static json_t *field_json(const cli_field_row *row)
 {
   const remap_field_report *what = &row->what;
 
-  return json_pack("{s:o, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I}", "name", words(row->name), "nature",
+  return json_pack("{s:o, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:I}", "name", words(row->name), "nature",
                    nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter), "source_integral",
                    real(what->source_integral), "target_integral", real(what->target_integral), "conservation_error",
                    real(what->conservation_error), "source_min", real(what->source_min), "source_max", real(what->source_max),
                    "target_min", real(what->target_min), "target_max", real(what->target_max), "limited_cells",
-                   (json_int_t)what->limited_cells);
+                   (json_int_t)what->limited_cells, "order_reduced_cells", (json_int_t)what->order_reduced_cells);
 }
 
 /* The whole report; NULL if memory is out. The caller ends it with json_decref. */

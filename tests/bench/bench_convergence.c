@@ -6,15 +6,20 @@
 #include <time.h>
 #include "averages.h"
 
-enum { NUM_WAYS = 7 };
+enum { NUM_WAYS = 9 };
 static const struct {
   int           order;
   remap_limiter limiter;
   const char   *name;
-} ways[NUM_WAYS] = {
-    {1, REMAP_LIMITER_NONE, "none"}, {2, REMAP_LIMITER_NONE, "none"}, {2, REMAP_LIMITER_BARTH_JESPERSEN, "barth-jespersen"},
-    {2, REMAP_LIMITER_AUTO, "auto"}, {3, REMAP_LIMITER_NONE, "none"}, {3, REMAP_LIMITER_BARTH_JESPERSEN, "barth-jespersen"},
-    {3, REMAP_LIMITER_AUTO, "auto"}};
+} ways[NUM_WAYS] = {{1, REMAP_LIMITER_NONE, "none"},
+                    {2, REMAP_LIMITER_NONE, "none"},
+                    {2, REMAP_LIMITER_BARTH_JESPERSEN, "barth-jespersen"},
+                    {2, REMAP_LIMITER_CAAS, "caas"},
+                    {2, REMAP_LIMITER_AUTO, "auto"},
+                    {3, REMAP_LIMITER_NONE, "none"},
+                    {3, REMAP_LIMITER_BARTH_JESPERSEN, "barth-jespersen"},
+                    {3, REMAP_LIMITER_CAAS, "caas"},
+                    {3, REMAP_LIMITER_AUTO, "auto"}};
 
 typedef struct outcome {
   av_error error;
@@ -30,7 +35,7 @@ static int fail(remap_context *ctx, remap_status status)
 
 static int run(av_kind kind, int n, int extra, outcome out[AV_NUM][NUM_WAYS])
 {
-  tm_mesh       *mesh[2] = {av_mesh(kind, n, 0.7), av_mesh(kind, n + extra, 0.1)};
+  tm_mesh       *mesh[2] = {av_mesh(kind, n, 0.03), av_mesh(kind, n + extra, -0.02)};
   av_field      *field[AV_NUM];
   double        *mean[2][AV_NUM], *volume[2], *got = tm_alloc_(mesh[1]->view.num_cells, sizeof *got);
   remap_context *ctx = NULL;

@@ -154,16 +154,17 @@ static inline av_error av_difference(int64_t n, const double *volume, const doub
 typedef enum av_kind { AV_HEXAHEDRA, AV_TETRAHEDRA, AV_DUAL, AV_MIXED, AV_NUM_KINDS } av_kind;
 static const char *const av_kind_name[] = {"hexahedra", "tetrahedra", "dual", "mixed"};
 
-/* Warped meshes of a lattice of n^3; tetrahedra and duals, which have more faces, of one half as fine. */
-static inline tm_mesh *av_mesh(av_kind kind, int n, double phase)
+/* Meshes of the unit cube on a lattice of n^3, warped by `size` but for its walls; tetrahedra and duals, which have more faces, of
+ * one half as fine. */
+static inline tm_mesh *av_mesh(av_kind kind, int n, double size)
 {
   const int        h       = n / 2 + n % 2;
-  const tm_warping warping = {0.03, phase}, gentle = {0.02, phase};
+  const tm_warping warping = {size, 0};
 
   switch (kind) {
     case AV_TETRAHEDRA: return tm_tetrahedra((int[]){h, h, h}, tm_warp, &warping);
-    case AV_DUAL: return tm_dual((int[]){h, h, h}, tm_warp, &gentle);
-    case AV_MIXED: return tm_mixed((int[]){n, n, n}, tm_warp, &gentle);
+    case AV_DUAL: return tm_dual((int[]){h, h, h}, tm_warp, &warping);
+    case AV_MIXED: return tm_mixed((int[]){n, n, n}, tm_warp, &warping);
     default: return tm_hexahedra((int[]){n, n, n}, tm_warp, &warping);
   }
 }

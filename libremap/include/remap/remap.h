@@ -93,9 +93,12 @@ typedef enum remap_nature {
 
 /** Bounds on the reconstruction inside each giving cell. */
 typedef enum remap_limiter {
-  REMAP_LIMITER_NONE            = 0, /**< linear fields are reproduced exactly; may overshoot at jumps */
+  REMAP_LIMITER_NONE            = 0, /**< linear fields (order 3: quadratic ones) are reproduced exactly; may overshoot at jumps */
   REMAP_LIMITER_BARTH_JESPERSEN = 1, /**< no value beyond those of the vertex neighbours */
-  REMAP_LIMITER_AUTO            = 2  /**< the library's choice: BARTH_JESPERSEN */
+  REMAP_LIMITER_AUTO            = 2, /**< BARTH_JESPERSEN where the field is not smooth; smooth extrema and slopes towards walls
+                                          stay, but no sign changes that the neighbours do not have */
+  REMAP_LIMITER_CAAS            = 3  /**< receiving values are clipped to the bounds around their givers; what that takes is
+                                          spread over all cells, so that content is kept. Makes a transfer collective */
 } remap_limiter;
 
 /** What a receiving cell without any overlap gets. */
@@ -214,7 +217,7 @@ typedef struct remap_field_report {
   double  target_integral;    /**< new content less the old content that was kept */
   double  conservation_error; /**< their difference over the sum of abs(u) V */
   double  source_min, source_max, target_min, target_max;
-  int64_t limited_cells;      /**< giving cells whose slope was reduced */
+  int64_t limited_cells;      /**< giving cells whose reconstruction the limiter changed; CAAS: receiving cells clipped */
   int64_t order_reduced_cells; /**< giving cells that order 3 found too few neighbours for: order 2 there */
 } remap_field_report;
 
@@ -302,11 +305,12 @@ REMAP_API remap_status remap_move(remap_context *ctx, const remap_motion motion[
 REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *masks);
 
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
- *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields,
- *  order 2, bounds, nearest cells), prepares it: it is collective. So is a call with reports, [num_fields] on every rank or
- *  NULL on every rank, which get the same content everywhere. Any other call exchanges messages with neighbours only and
- *  takes no memory: its status is the worst of this rank's own and of those neighbours' whose values it uses, and may
- *  differ from rank to rank; remap_agree makes it one. Values below 1e-280 count as 0.
+ *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields, a
+ *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS, and one
+ *  with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
+ *  exchanges messages with neighbours only and takes no memory: its status is the worst of this rank's own and of those
+ *  neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes it one. Values below 1e-280 count
+ *  as 0.
  *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value), COVERAGE, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
                                    const remap_field_desc *fields, remap_field_report *reports);

@@ -17,7 +17,7 @@ static remap_status check_agreed(const remap_context *ctx, remap_direction direc
   if (how->order < 1 || how->order > ctx->options.max_order)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "order %d is not within 1..%d, the context's max_order", how->order,
                    ctx->options.max_order);
-  if (how->limiter < REMAP_LIMITER_NONE || how->limiter > REMAP_LIMITER_AUTO || how->on_uncovered < REMAP_UNCOVERED_KEEP ||
+  if (how->limiter < REMAP_LIMITER_NONE || how->limiter > REMAP_LIMITER_CAAS || how->on_uncovered < REMAP_UNCOVERED_KEEP ||
       how->on_uncovered > REMAP_UNCOVERED_ERROR || how->on_partial < REMAP_PARTIAL_BLEND || how->on_partial > REMAP_PARTIAL_ERROR)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "the limiter or a coverage policy is not one of its enum");
   if (num_fields < 0 || (num_fields > 0 && !fields))

@@ -1,20 +1,27 @@
 /* carrier -- fields from giving to receiving cells, in two steps.
  *
  *   start    values are gathered and checked; those of the stencil's halo travel (order 2), or all that is given (order 1)
- *   finish   slopes of the giving cells; what is given travels; cells receive; uncovered cells take the nearest value, where
- *            there are any; exact integrals, where somebody wants them; values are written
+ *   finish   for the limiter auto, slopes travel and then which cells are rough, twice; reconstruction of the giving cells; what
+ *            is given travels; cells receive; for CAAS, a sum over all ranks; uncovered cells take the nearest value, where there
+ *            are any; exact integrals, where somebody wants them; values are written
  *
  * Every message carries its sender's status, so a failure reaches all who depend on it, in the exchange that follows. The caller's
- * arrays are written at the very end, when nothing can fail any more. O(pairs) time per field; 16 bytes per receiving cell, and
- * 16 to 56 per giving cell, for each field. */
+ * arrays are written at the very end, when nothing can fail any more. O(pairs) time per field; 16 bytes per receiving cell (24 for
+ * CAAS) and 16 to 56 per giving cell (40 more for auto, 56 more for order 3) for each field. */
 #include "field_private.h"
 
 #include <stdio.h>
+#include <string.h>
 
 struct rm_carrier {
   rm_transfer_setup setup;
   rm_load           load;       /* the most it can carry                                       */
   rm_flow           halo;       /* values around the giving cells' stencils                     */
+  rm_flow           slopes, roughs; /* likewise slopes and roughness, if smooth cells are told from others */
+  double          (*slope)[3];  /* [giving cells][num_fields]                                   */
+  double           *rough, *spread; /* [giving cells][num_fields] cells that are rough, and their neighbours too */
+  double           *old;        /* [receiving cells][num_fields] values before, if CAAS needs them */
+  rm_sum           *sum;        /* [num_fields][3] of CAAS                                      */
   rm_flow           given_flow; /* what giving cells give                                       */
   rm_flow           taken;      /* values that uncovered cells take                             */
   const rm_nearest *nearest;    /* NULL: nobody takes any                                       */
@@ -43,7 +50,7 @@ static bool has_slope(const remap_transfer *how, const remap_field_desc *field)
   return how->order > 1 && field->nature != REMAP_FLAG;
 }
 
-/* Do cells that are covered in part take the reconstruction to their centroids, and so need its bounds? */
+/* Do receiving cells need the bounds of what they are given: all (CAAS), or those in part covered that it is taken beyond? */
 static bool needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
 {
   bool normalises = false;
@@ -51,7 +58,7 @@ static bool needs_bounds(const rm_transfer_setup *setup, const remap_transfer *h
   for (int f = 0; f < num_fields; f++)
     normalises |= has_slope(how, &fields[f]) && (how->on_partial == REMAP_PARTIAL_NORMALISE ||
                                                  (how->on_partial == REMAP_PARTIAL_BLEND && !fields[f].has_old));
-  return normalises && how->limiter != REMAP_LIMITER_NONE && setup->any_partial;
+  return how->limiter == REMAP_LIMITER_CAAS || (normalises && how->limiter != REMAP_LIMITER_NONE && setup->any_partial);
 }
 
 rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
@@ -65,6 +72,8 @@ rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, in
     load.width += rm_pack_width(is_sloped ? how->order : 1, has_bounds);
     load.has_slopes |= is_sloped;
     load.is_wide |= is_sloped && how->order > 2;
+    load.is_settled |= is_sloped && how->limiter == REMAP_LIMITER_CAAS;
+    load.is_checked |= is_sloped && how->limiter == REMAP_LIMITER_AUTO;
     load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
   }
   return load;
@@ -72,13 +81,19 @@ rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, in
 
 rm_load rm_load_max(rm_load a, rm_load b)
 {
-  return (rm_load){a.num_fields > b.num_fields ? a.num_fields : b.num_fields, a.width > b.width ? a.width : b.width,
-                   a.has_slopes || b.has_slopes, a.is_wide || b.is_wide, a.has_nearest || b.has_nearest};
+  return (rm_load){a.num_fields > b.num_fields ? a.num_fields : b.num_fields,
+                   a.width > b.width ? a.width : b.width,
+                   a.has_slopes || b.has_slopes,
+                   a.is_settled || b.is_settled,
+                   a.is_checked || b.is_checked,
+                   a.is_wide || b.is_wide,
+                   a.has_nearest || b.has_nearest};
 }
 
 bool rm_load_covers(rm_load a, rm_load b)
 {
-  return a.num_fields >= b.num_fields && a.width >= b.width && a.has_slopes >= b.has_slopes && a.is_wide >= b.is_wide &&
+  return a.num_fields >= b.num_fields && a.width >= b.width && a.has_slopes >= b.has_slopes &&
+         a.is_settled >= b.is_settled && a.is_checked >= b.is_checked && a.is_wide >= b.is_wide &&
          a.has_nearest >= b.has_nearest;
 }
 
@@ -87,7 +102,8 @@ static void lay_out(rm_carrier *c, int num_fields)
   rm_packing *p = &c->packing;
 
   p->num_fields = num_fields;
-  p->is_limited = c->how.limiter != REMAP_LIMITER_NONE;
+  p->is_limited = c->how.limiter == REMAP_LIMITER_BARTH_JESPERSEN || c->how.limiter == REMAP_LIMITER_AUTO;
+  p->is_checked = c->how.limiter == REMAP_LIMITER_AUTO;
   p->has_bounds = needs_bounds(&c->setup, &c->how, num_fields, c->fields);
   p->width      = 0;
   for (int f = 0; f < num_fields; f++) {
@@ -130,6 +146,17 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
     RM_TRY(rm_flow_init(arena, setup->giving_stencil->plan, bytes, &c->halo));
     mark_halo_cells(setup->giving_stencil, c->needs_halo);
   }
+  if (c->load.is_settled) {
+    RM_NEW(c->old, arena, rm_mul_sat(setup->receiving->num_cells, n));
+    RM_NEW(c->sum, arena, 3 * (int64_t)n);
+  }
+  if (c->load.is_checked) {
+    RM_TRY(rm_flow_init(arena, setup->giving_stencil->plan, 3 * bytes, &c->slopes));
+    RM_TRY(rm_flow_init(arena, setup->giving_stencil->plan, bytes, &c->roughs));
+    RM_NEW(c->slope, arena, rm_mul_sat(setup->giving->num_cells, n));
+    RM_NEW(c->rough, arena, rm_mul_sat(setup->giving->num_cells, n));
+    RM_NEW(c->spread, arena, rm_mul_sat(setup->giving->num_cells, n));
+  }
   if (c->load.has_nearest) RM_TRY(rm_flow_init(arena, c->nearest->plan, bytes, &c->taken));
   return rm_flow_init(arena, setup->rows->plan, (size_t)c->load.width * sizeof(double), &c->given_flow);
 }
@@ -157,6 +184,8 @@ void rm_carrier_abandon(rm_carrier *c)
   if (!rm_carrier_is_under_way(c)) return;
   c->is_under_way = false;
   if (c->halo.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->halo, &c->note);
+  if (c->slopes.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->slopes, &c->note);
+  if (c->roughs.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->roughs, &c->note);
   if (c->given_flow.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->given_flow, &c->note);
 }
 
@@ -270,11 +299,15 @@ static void note(rm_carrier *c, remap_status status)
   if ((int64_t)status > c->note.status) c->note.status = status;
 }
 
+/* What a flow has brought. */
+static const double *numbers_in(const rm_flow *flow) { return (const double *)(const void *)flow->received; }
+
 /* Reconstruct the cells whose neighbours are all here, or the others. */
 static void reconstruct(rm_carrier *c, uint8_t which)
 {
-  rm_reconstruct(&c->setup, &c->packing, c->given, (const double *)(const void *)c->halo.received, c->needs_halo, which, c->pack,
-                 c->limited, c->limited + c->packing.num_fields);
+  rm_reconstruct(&c->setup, &c->packing, (rm_numbers){c->given, numbers_in(&c->halo)},
+                 (rm_numbers){c->spread, numbers_in(&c->roughs)}, c->needs_halo, which, c->pack, c->limited,
+                 c->limited + c->packing.num_fields);
 }
 
 /* Does this transfer read the halo? */
@@ -336,7 +369,7 @@ static void take_nearest(rm_carrier *c)
 {
   const rm_nearest *nearest = c->nearest;
   const int         num     = c->packing.num_fields;
-  const double     *got     = (const double *)(const void *)c->taken.received;
+  const double     *got     = numbers_in(&c->taken);
 
   note(c, rm_flow_post(c->setup.comm, &c->taken, (size_t)num * sizeof(double), c->value, c->note));
   await(c, &c->taken);
@@ -347,23 +380,61 @@ static void take_nearest(rm_carrier *c)
         c->value[(int64_t)nearest->cell[k] * num + f] = got[(int64_t)nearest->origin[k] * num + f];
 }
 
+/* Tell smooth cells from others: slopes of all around, then roughness of all around, and of all around them. */
+static void find_smooth(rm_carrier *c)
+{
+  const rm_stencil *stencil = c->setup.giving_stencil;
+  const size_t      bytes   = (size_t)c->packing.num_fields * sizeof(double);
+  const rm_numbers  given   = {c->given, numbers_in(&c->halo)};
+
+  if (c->note.status == REMAP_OK) rm_smooth_slopes(stencil, &c->packing, given, c->slope);
+  note(c, rm_flow_post(c->setup.comm, &c->slopes, 3 * bytes, c->slope, c->note));
+  await(c, &c->slopes);
+  if (c->note.status == REMAP_OK)
+    rm_smooth_roughness(stencil, c->setup.giving, &c->packing, given, (const double(*)[3])c->slope,
+                        (const double(*)[3])(const void *)c->slopes.received, c->rough);
+  note(c, rm_flow_post(c->setup.comm, &c->roughs, bytes, c->rough, c->note));
+  await(c, &c->roughs);
+  if (c->note.status == REMAP_OK)
+    rm_smooth_spread(stencil, &c->packing, (rm_numbers){c->rough, numbers_in(&c->roughs)}, c->spread);
+  note(c, rm_flow_post(c->setup.comm, &c->roughs, bytes, c->spread, c->note));
+  await(c, &c->roughs);
+}
+
+/* Clip the new values and give back what that takes. Collective. */
+static void settle(rm_carrier *c, const rm_receipt *receipt)
+{
+  const int64_t before = c->note.status;
+
+  c->note.status = (int64_t)rm_comm_agree(c->setup.comm, (remap_status)before, NULL);
+  if (c->note.status != REMAP_OK) return;
+  rm_caas_sum(receipt, c->old, c->sum);
+  note(c, rm_comm_sum_exact(c->setup.comm, c->sum, 3 * c->packing.num_fields));
+  if (c->note.status == REMAP_OK) rm_caas_settle(receipt, c->old, c->sum, c->limited);
+}
+
 /* Everything up to the new values. */
 static void carry(rm_carrier *c, bool wants_integral)
 {
   const int  num         = c->packing.num_fields;
+  const bool is_settled  = reads_halo(c) && c->how.limiter == REMAP_LIMITER_CAAS;
   bool       any_nearest = false;
   rm_receipt receipt     = {&c->setup, &c->how, c->fields, &c->packing, NULL, c->value, wants_integral ? c->integral : NULL};
 
   for (int f = 0; f < num; f++) any_nearest |= c->setup.any_uncovered && rm_needs_nearest(&c->how, &c->fields[f]);
   if (reads_halo(c)) {
-    if (c->note.status == REMAP_OK) reconstruct(c, 0);
+    if (c->note.status == REMAP_OK && !c->packing.is_checked) reconstruct(c, 0);
     await(c, &c->halo);
+    if (c->packing.is_checked) find_smooth(c);
+    if (c->note.status == REMAP_OK && c->packing.is_checked) reconstruct(c, 0);
     if (c->note.status == REMAP_OK) reconstruct(c, 1);
     give(c);
   }
   await(c, &c->given_flow);
-  receipt.got = (const double *)(const void *)c->given_flow.received;
+  receipt.got = numbers_in(&c->given_flow);
+  if (is_settled) memcpy(c->old, c->value, (size_t)c->setup.receiving->num_cells * (size_t)num * sizeof *c->old);
   if (c->note.status == REMAP_OK) rm_receive(&receipt);
+  if (is_settled) settle(c, &receipt);
   if (any_nearest) take_nearest(c);
 }
 

@@ -18,6 +18,7 @@ typedef struct rm_stencil {
   const int64_t *node_offset;       /* [num_cells + 1] the cell's nodes, for bounds                          */
   const rm_lid  *node;              /* [node_offset[num_cells]] of the mesh                                  */
   rm_lid         num_halo;
+  const double (*halo_centroid)[3]; /* [num_halo]                                                            */
   const rm_plan *plan;              /* brings the halo's values: received item k is halo cell k              */
 
   /* Of a widened stencil, else NULL: least squares for quadratic polynomials g.y + sum of h (y y^T - spread), y = x - c, with
@@ -64,6 +65,8 @@ typedef struct rm_load {
   int  num_fields;
   int  width;       /* doubles that travel per giving cell           */
   bool has_slopes;  /* needs the stencil's halo                       */
+  bool is_settled;  /* limiter CAAS: old values and sums are kept     */
+  bool is_checked;  /* limiter auto: slopes and roughness travel too    */
   bool is_wide;     /* of the widened stencil, for order 3            */
   bool has_nearest; /* uncovered cells take the nearest mapped cell's */
 } rm_load;

@@ -57,6 +57,7 @@ typedef struct rm_packing {
   int *order;      /* [num_fields] 1, 2 or 3                 */
   bool has_bounds; /* fields of order 2 or 3 carry the bounds */
   bool is_limited; /* Barth-Jespersen                        */
+  bool is_checked; /* but not in cells that are smooth       */
 } rm_packing;
 enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
 
@@ -78,11 +79,66 @@ static inline double rm_dot6(const double h[6], const double s[6])
   return h[0] * s[0] + h[1] * s[1] + h[2] * s[2] + h[3] * s[3] + h[4] * s[4] + h[5] * s[5];
 }
 
+/* Numbers of the giving cells, [giving cells][num_fields], and of the stencil's halo, [num_halo][num_fields]. */
+typedef struct rm_numbers {
+  const double *own, *halo;
+} rm_numbers;
+
+/* Values of one field: own cells, then the halo's. */
+typedef struct rm_around {
+  const double *own, *halo; /* [cells][stride], this field's first value */
+  int64_t       stride;
+} rm_around;
+static inline double rm_value_at(const rm_around *u, rm_lid num_cells, rm_lid cell)
+{
+  return RM_VALUE_SCALE * (cell < num_cells ? u->own[cell * u->stride] : u->halo[(cell - num_cells) * u->stride]);
+}
+
+/* Those of field f out of num. */
+static inline rm_around rm_around_of(rm_numbers numbers, int f, int num)
+{
+  return (rm_around){numbers.own ? numbers.own + f : NULL, numbers.halo ? numbers.halo + f : NULL, num};
+}
+
+/* Least-squares slope over the vertex neighbours, scaled; bounds become least and greatest value of the cell and them. */
+void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double bounds[2]);
+
+/* Slope and curvature, with its constant, of the quadratic polynomial, scaled; the stencil is widened. False if there is none:
+ * slope stays as it is and curvature is 0. */
+bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7]);
+
 /* Fill the pack, [giving cells][width], of cells whose needs_halo is `which`; limited and reduced [num_fields] grow by the number
- * of cells whose slope was reduced by the limiter, and of those that order 3 has no polynomial for. given is [giving cells][num_fields], halo [halo of the stencil][num_fields], read only for cells that
- * need it. Cells that cover nothing get slope 0. Not collective. */
-void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, const double *given, const double *halo,
+ * of cells whose reconstruction the limiter changed, and of those that order 3 has no polynomial for. rough says which cells are
+ * not smooth, for a packing that is checked; the halo's numbers are read only for cells that need it. Cells that cover nothing get
+ * slope 0. Not collective. */
+void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, rm_numbers given, rm_numbers rough,
                     const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited, int64_t *reduced);
+
+/* ---- smooth ---------------------------------------------------------------------------------------------------- */
+
+/* Slopes of all own cells, [giving cells][num_fields][3], scaled. Not collective. */
+void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[3]);
+
+/* 1 for own cells that are rough, 0 for others, [giving cells][num_fields]. Not collective. */
+void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
+                         const double (*slope)[3], const double (*halo_slope)[3], double *rough);
+
+/* 1 for own cells that are rough or have a rough neighbour, 0 for others, [giving cells][num_fields]. Not collective. */
+void rm_smooth_spread(const rm_stencil *stencil, const rm_packing *packing, rm_numbers rough, double *spread);
+
+/* Are a cell and its neighbours all not rough? Not collective. */
+bool rm_is_smooth(const rm_stencil *stencil, rm_lid cell, const rm_around *rough);
+
+/* ---- caas ------------------------------------------------------------------------------------------------------ */
+
+typedef struct rm_receipt rm_receipt;
+
+/* What clipping takes from the new values, and the room above and below the clipped ones, [num_fields][3], scaled; to be summed
+ * over all ranks. old [receiving cells][num_fields] are the values before. The pack has bounds. Not collective. */
+void rm_caas_sum(const rm_receipt *receipt, const double *old, rm_sum *sum);
+
+/* Clip, and give back what the sums over all ranks say. limited [num_fields] grows by the number of clipped cells. */
+void rm_caas_settle(const rm_receipt *receipt, const double *old, const rm_sum *sum, int64_t *limited);
 
 /* ---- nearest --------------------------------------------------------------------------------------------------- */
 
@@ -145,7 +201,7 @@ remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setu
 /* ---- receive --------------------------------------------------------------------------------------------------- */
 
 /* One transfer on the receiving side. */
-typedef struct rm_receipt {
+struct rm_receipt {
   const rm_transfer_setup *setup;
   const remap_transfer    *how;
   const remap_field_desc  *fields;   /* [packing->num_fields]                                     */
@@ -153,7 +209,7 @@ typedef struct rm_receipt {
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
   rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */
-} rm_receipt;
+};
 
 /* Is a receiving cell's old value used? */
 bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover);

@@ -1,10 +1,12 @@
 /* leastsq -- the weights of a least-squares gradient in one cell, and the axes in which its neighbours spread evenly.
  *
- * Minimise sum over k of (w_k (g.d_k - du_k))^2 with w_k = 1/|d_k|, so that near neighbours count more: on curved layers of thin
- * cells a gradient across the layer survives. The matrix A = (w_k d_k) is factored A = Q R by Gram-Schmidt, every column
- * orthogonalised twice, with columns scaled to unit length and pivoting. Columns of rounding only are left out first: unit
- * length would turn them into slopes. If the rest has lower rank too (a thin mesh that is not parallel to an axis), the slope is
- * sought within the space of the distances alone, so that it is 0 in every direction they do not span. O(n) time per cell. */
+ * Minimise sum over k of (w_k (g.d_k - du_k))^2 with w_k = 1/(|d_k| |W d_k|), so that near neighbours count more. W d are
+ * distances in the axes in which the neighbours spread evenly: cells of any shape have near ones among them; |d_k| lets a gradient
+ * across curved layers of thin cells survive, and more of it would cost digits there. The matrix A = (w_k d_k) is factored
+ * A = Q R by Gram-Schmidt, every column orthogonalised twice, with columns scaled to unit length and pivoting. Columns of rounding
+ * only are left out first: unit length would turn them into slopes. If the rest has lower rank too (a thin mesh that is not
+ * parallel to an axis), the slope is sought within the space of the distances alone, so that it is 0 in every direction they do
+ * not span. O(n) time per cell. */
 #include "field_private.h"
 
 /* A = Q R over the columns that are linearly independent, in pivot order. */
@@ -15,6 +17,8 @@ typedef struct factors {
 } factors;
 
 static const double INDEPENDENT = 0x1p-27; /* relative to the length of a column: about 1e-8 */
+
+static double square(double x) { return x * x; }
 
 static double dot_columns(int64_t n, const double (*a)[3], int c, int e)
 {
@@ -105,10 +109,10 @@ static int row_space(const factors *f, double basis[3][3])
   return num;
 }
 
-/* Row weights, 1/|d| or 1, but 0 where the distance is rounding only; d becomes w d, without the columns that span nothing. The
- * number of columns left; *noise_length receives the largest length that rounding has in a scaled column. */
-static int weigh_rows(int64_t n, double (*d)[3], bool by_distance, const rm_distance_noise *noise, double *row_weight,
-                      double *noise_length)
+/* Row weights, 1/(|d| |W d|) or 1 without axes W, but 0 where the distance is rounding only; d becomes w d, without the columns that
+ * span nothing. The number of columns left; *noise_length receives the largest length that rounding has in a scaled column. */
+static int weigh_rows(int64_t n, double (*d)[3], int num_axes, const double axes[3][3], const rm_distance_noise *noise,
+                      double *row_weight, double *noise_length)
 {
   double longest[3] = {0.0, 0.0, 0.0}, length2[3] = {0.0, 0.0, 0.0}, sum2 = 0.0;
   int    num = 0;
@@ -117,9 +121,11 @@ static int weigh_rows(int64_t n, double (*d)[3], bool by_distance, const rm_dist
     const double *x      = d[k];
     const double  length = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
     bool          is_far = false;
+    double        spread = 0.0;
 
     for (int c = 0; c < 3; c++) is_far |= fabs(x[c]) > noise->coordinate[c] + 0x1p-40 * noise->extent[c];
-    row_weight[k] = is_far ? (by_distance ? 1.0 / length : 1.0) : 0.0;
+    for (int a = 0; a < num_axes; a++) spread += square(axes[a][0] * x[0] + axes[a][1] * x[1] + axes[a][2] * x[2]);
+    row_weight[k] = !is_far ? 0.0 : num_axes == 0 ? 1.0 : spread > 0.0 ? 1.0 / (length * sqrt(spread)) : 0.0;
     sum2 += row_weight[k] * row_weight[k];
     for (int c = 0; c < 3; c++) {
       if (is_far && fabs(x[c]) > longest[c]) longest[c] = fabs(x[c]);
@@ -152,35 +158,10 @@ static void project_rows(int64_t n, double (*a)[3], const factors *f, const doub
   }
 }
 
-void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3])
-{
-  double    noise_length, basis[3][3] = {{0.0}};
-  const int num = weigh_rows(n, d, true, noise, scratch, &noise_length);
-  int       dim = 3;
-  factors   f;
-
-  factor(n, d, 3, fmax(INDEPENDENT, noise_length), &f);
-  if (f.rank < num) {
-    dim = row_space(&f, basis);
-    project_rows(n, d, &f, (const double(*)[3])basis, dim);
-    factor(n, d, dim, 0.0, &f);
-  }
-  for (int64_t k = 0; k < n; k++) {
-    double x[3];
-
-    solve_row(&f, d[k], x);
-    for (int c = 0; c < 3; c++) {
-      const double along = dim < 3 ? x[0] * basis[0][c] + x[1] * basis[1][c] + x[2] * basis[2][c] : x[c];
-
-      weight[k][c] = scratch[k] * along;
-    }
-  }
-}
-
 int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double axes[3][3])
 {
   double    noise_length, basis[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
-  const int num = weigh_rows(n, d, false, noise, scratch, &noise_length);
+  const int num = weigh_rows(n, d, 0, NULL, noise, scratch, &noise_length);
   factors   f;
 
   factor(n, d, 3, fmax(INDEPENDENT, noise_length), &f);
@@ -201,4 +182,32 @@ int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, d
     }
   }
   return f.rank;
+}
+
+void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3])
+{
+  double  noise_length, axes[3][3], basis[3][3] = {{0.0}};
+  int     num_axes, num, dim = 3;
+  factors f;
+
+  for (int64_t k = 0; k < n; k++)
+    for (int c = 0; c < 3; c++) weight[k][c] = d[k][c];
+  num_axes = rm_leastsq_axes(n, weight, noise, scratch, axes);
+  num      = weigh_rows(n, d, num_axes, (const double(*)[3])axes, noise, scratch, &noise_length);
+  factor(n, d, 3, fmax(INDEPENDENT, noise_length), &f);
+  if (f.rank < num) {
+    dim = row_space(&f, basis);
+    project_rows(n, d, &f, (const double(*)[3])basis, dim);
+    factor(n, d, dim, 0.0, &f);
+  }
+  for (int64_t k = 0; k < n; k++) {
+    double x[3];
+
+    solve_row(&f, d[k], x);
+    for (int c = 0; c < 3; c++) {
+      const double along = dim < 3 ? x[0] * basis[0][c] + x[1] * basis[1][c] + x[2] * basis[2][c] : x[c];
+
+      weight[k][c] = scratch[k] * along;
+    }
+  }
 }

@@ -6,17 +6,6 @@
  * polynomial that may leave these bounds anywhere in the cell gives way to the limited slope. Values are scaled by a power of two, so nothing overflows and no digit changes. O(neighbours) per cell and field. */
 #include "field_private.h"
 
-/* Values of one field: own cells, then the halo's. */
-typedef struct around {
-  const double *own, *halo;
-  int64_t       stride;
-} around;
-
-static double value_at(const around *u, rm_lid num_cells, rm_lid cell)
-{
-  return RM_VALUE_SCALE * (cell < num_cells ? u->own[cell * u->stride] : u->halo[(cell - num_cells) * u->stride]);
-}
-
 /* The factor by which the slope may stay so that the nodes keep within [least, greatest]. */
 static double barth_jespersen(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, double value, const double slope[3],
                               double least, double greatest)
@@ -56,15 +45,14 @@ static bool keeps_within(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid 
   return true;
 }
 
-/* Least-squares slope over the vertex neighbours, and the bounds that they and the cell give. */
-static void fit_slope(const rm_stencil *stencil, rm_lid cell, const around *u, double slope[3], double bounds[2])
+void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double bounds[2])
 {
-  const double value = value_at(u, stencil->num_cells, cell);
+  const double value = rm_value_at(u, stencil->num_cells, cell);
 
   slope[0] = slope[1] = slope[2] = 0.0;
   bounds[0] = bounds[1] = value;
   for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++) {
-    const double other = value_at(u, stencil->num_cells, stencil->neighbour[k]), rise = other - value;
+    const double other = rm_value_at(u, stencil->num_cells, stencil->neighbour[k]), rise = other - value;
 
     for (int d = 0; d < 3; d++) slope[d] += stencil->weight[k][d] * rise;
     bounds[0] = fmin(bounds[0], other);
@@ -73,16 +61,15 @@ static void fit_slope(const rm_stencil *stencil, rm_lid cell, const around *u, d
   if (!isfinite(slope[0]) || !isfinite(slope[1]) || !isfinite(slope[2])) slope[0] = slope[1] = slope[2] = 0.0;
 }
 
-/* Slope and curvature, with its constant, of the quadratic polynomial. False if there is none: curvature is 0 then. */
-static bool fit_quadratic(const rm_stencil *stencil, rm_lid cell, const around *u, double slope[3], double curvature[7])
+bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7])
 {
-  const double value   = value_at(u, stencil->num_cells, cell);
+  const double value   = rm_value_at(u, stencil->num_cells, cell);
   double       fit[9]  = {0.0};
   bool         is_good = !stencil->is_reduced[cell];
 
   for (int k = 0; k < 7; k++) curvature[k] = 0.0;
   for (int64_t k = stencil->wide_offset[cell]; k < stencil->wide_offset[cell + 1] && is_good; k++) {
-    const double rise = value_at(u, stencil->num_cells, stencil->wide_neighbour[k]) - value;
+    const double rise = rm_value_at(u, stencil->num_cells, stencil->wide_neighbour[k]) - value;
 
     for (int i = 0; i < 9; i++) fit[i] += stencil->wide_weight[k][i] * rise;
   }
@@ -94,24 +81,34 @@ static bool fit_quadratic(const rm_stencil *stencil, rm_lid cell, const around *
   return true;
 }
 
+/* A smooth field may leave the neighbours' bounds, at extrema and towards walls: by as much as they lie apart, not past 0. */
+static void widen_bounds(double bounds[2])
+{
+  const double range = bounds[1] - bounds[0];
+
+  bounds[0] = bounds[0] >= 0.0 ? fmax(bounds[0] - range, 0.0) : bounds[0] - range;
+  bounds[1] = bounds[1] <= 0.0 ? fmin(bounds[1] + range, 0.0) : bounds[1] + range;
+}
+
 /* What became of a cell's reconstruction. */
 enum { IS_LIMITED = 1, IS_REDUCED = 2 };
 
 /* Reconstruction and bounds of one field in one cell, into its place in the pack. */
-static int reconstruct_cell(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, const around *u, int order,
-                            const rm_packing *packing, double *place)
+static int reconstruct_cell(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, const rm_around *u, int order,
+                            const rm_packing *packing, bool is_smooth, double *place)
 {
-  const double value = value_at(u, mesh->num_cells, cell);
+  const double value = rm_value_at(u, mesh->num_cells, cell);
   double      *slope = place + RM_PACK_SLOPE, *curvature = place + rm_pack_curvature(packing->has_bounds);
   double       linear[3], bounds[2], factor;
   int          what = 0;
 
-  fit_slope(stencil, cell, u, linear, bounds);
+  rm_fit_slope(stencil, cell, u, linear, bounds);
   for (int d = 0; d < 3; d++) slope[d] = linear[d];
+  if (is_smooth) widen_bounds(bounds);
   if (packing->has_bounds)
     for (int b = 0; b < 2; b++) place[RM_PACK_BOUNDS + b] = bounds[b];
   if (order > 2) {
-    if (!fit_quadratic(stencil, cell, u, slope, curvature))
+    if (!rm_fit_quadratic(stencil, cell, u, slope, curvature))
       what |= IS_REDUCED;
     else if (!packing->is_limited || keeps_within(stencil, mesh, cell, value, slope, curvature, bounds[0], bounds[1]))
       return what;
@@ -134,7 +131,7 @@ static void move_to_rounded_centroid(const double error[3], double *place)
   if (rise < 0.0 || rise > 0.0) place[0] = (RM_VALUE_SCALE * place[0] - rise) / RM_VALUE_SCALE;
 }
 
-void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, const double *given, const double *halo,
+void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, rm_numbers given, rm_numbers rough,
                     const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited, int64_t *reduced)
 {
   const rm_mesh *mesh = setup->giving;
@@ -143,14 +140,16 @@ void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, c
   for (rm_lid c = 0; c < mesh->num_cells; c++) { /* cells first: their weights are read once for all fields */
     if (needs_halo[c] != which) continue;
     for (int f = 0; f < num; f++) {
-      const around u     = {given + f, halo ? halo + f : NULL, num};
-      const int    order = packing->order[f];
-      double      *place = pack + (int64_t)c * packing->width + packing->at[f];
+      const rm_around u     = rm_around_of(given, f, num);
+      const int       order = packing->order[f];
+      double         *place = pack + (int64_t)c * packing->width + packing->at[f];
 
-      place[0] = given[(int64_t)c * num + f];
+      place[0] = given.own[(int64_t)c * num + f];
       if (order < 2) continue;
       if (rm_is_mapped(setup->giving_rows->cover[c])) {
-        const int what = reconstruct_cell(setup->giving_stencil, mesh, c, &u, order, packing, place);
+        const rm_around r         = rm_around_of(rough, f, num);
+        const bool      is_smooth = packing->is_checked && rm_is_smooth(setup->giving_stencil, c, &r);
+        const int       what      = reconstruct_cell(setup->giving_stencil, mesh, c, &u, order, packing, is_smooth, place);
 
         limited[f] += (what & IS_LIMITED) != 0;
         reduced[f] += (what & IS_REDUCED) != 0;

@@ -259,7 +259,7 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
   d->num_all        = mesh->num_cells + (rm_lid)num;
   RM_NEW(d->halo_rank, d->scratch, num);
   RM_NEW(d->halo_cell, d->scratch, num);
-  RM_NEW(d->centroid, d->scratch, d->num_all);
+  RM_NEW(d->centroid, d->arena, d->num_all);
   RM_NEW(d->volume, d->scratch, d->num_all);
   RM_NEW(d->global, d->scratch, d->num_all);
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
@@ -281,6 +281,7 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
     d->volume[all] = v->volume;
     d->global[all] = v->global;
   }
+  stencil->halo_centroid = (const double(*)[3])(d->centroid + mesh->num_cells);
   RM_NEW0(d->node_halo_offset, d->scratch, (int64_t)mesh->num_nodes + 1);
   RM_NEW(d->node_halo, d->scratch, n);
   for (int64_t k = 0; k < n; k++) d->node_halo_offset[came[k].node]++;

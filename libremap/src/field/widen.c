@@ -339,17 +339,22 @@ static remap_status renumber_near(draft *d)
   const rm_stencil *near = d->near;
   const int64_t     n    = near->offset[near->num_cells];
   rm_lid           *neighbour;
+  double(*centroid)[3];
 
   RM_NEW(neighbour, d->arena, n);
+  RM_NEW(centroid, d->arena, d->wide->num_halo);
+  for (rm_lid h = 0; h < d->wide->num_halo; h++)
+    for (int i = 0; i < 3; i++) centroid[h][i] = d->all[near->num_cells + h].centroid[i];
   for (int64_t k = 0; k < n; k++)
     neighbour[k] =
         near->neighbour[k] < near->num_cells ? near->neighbour[k] : d->new_of_halo[near->neighbour[k] - near->num_cells];
-  d->wide->num_cells   = near->num_cells;
-  d->wide->offset      = near->offset;
-  d->wide->neighbour   = neighbour;
-  d->wide->weight      = near->weight;
-  d->wide->node_offset = near->node_offset;
-  d->wide->node        = near->node;
+  d->wide->num_cells     = near->num_cells;
+  d->wide->offset        = near->offset;
+  d->wide->neighbour     = neighbour;
+  d->wide->weight        = near->weight;
+  d->wide->node_offset   = near->node_offset;
+  d->wide->node          = near->node;
+  d->wide->halo_centroid = (const double(*)[3])centroid;
   return REMAP_OK;
 }
 

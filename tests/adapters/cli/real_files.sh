@@ -108,7 +108,7 @@ spheres() {
   done
   hold "$wrong" "a cube onto spheres of three levels"
   for pair in "01 02" "02 04" "04 01" "04 04"; do
-    both_ranks "${pair% *}.cgns" "${pair#* }.cgns" --output-solution Moved
+    both_ranks "${pair% *}.cgns" "${pair#* }.cgns" --output-solution Moved --limiter barth-jespersen
     bounded Density
     [ "$(value overlap target_uncovered)" = 0 ] || complain "cells are uncovered"
     hold "$wrong" "level ${pair% *} of the sphere onto level ${pair#* }"

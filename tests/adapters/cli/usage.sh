@@ -37,7 +37,7 @@ quick "a step is a number or last" "--step" good.cgns mesh.cgns -o out/result.cg
 quick "a step counts from 1" "--step" good.cgns mesh.cgns -o out/result.cgns --step 0
 quick "a value to fill with is a number" "fill=VALUE" good.cgns mesh.cgns -o out/result.cgns --on-uncovered fill=x
 quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out/result.cgns --step 1 --solution FlowSolution
-for option in order=3 order=two limiter=caas faces=center on-uncovered=blend on-partial=keep; do
+for option in order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
 for option in source-mask target-mask priority supermesh gamma nature check cgns-version; do
@@ -49,7 +49,7 @@ for option in fields order limiter faces on-uncovered on-partial solution step o
   transform report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
-if grep -E 'caas|1\|2\|3|mask|priority|supermesh|gamma|--check' stdout; then complain "--help offers too much"; fi
+if grep -E 'mask|priority|supermesh|gamma|--check' stdout; then complain "--help offers too much"; fi
 [ "$(awk 'length > 128' stdout)" = "" ] || complain "--help is wide"
 hold "$wrong" "--help says every option, and no other"
 works 2 --version
