@@ -209,7 +209,53 @@ static void an_overlap_a_millionth_of_a_millionth_thick_survives(void)
   RT_NEAR(r.stats.overlap_volume, thin, 1e-15 * thin);
 }
 
-RT_MAIN(RT_CASE(the_unit_of_length_does_not_matter), RT_CASE(a_place_far_from_the_origin_does_not_matter),
+/* On a cylinder of radius 1: x is the angle, y runs along the axis, z through layers 1e-5 thick in all. */
+static void to_curved_wall(double x[3], const void *data)
+{
+  const double r = 1 + 1e-5 * x[2], a = x[0] + *(const double *)data;
+
+  x[0] = r * cos(a);
+  x[2] = r * sin(a);
+}
+
+static void layers_of_pancakes_on_a_curved_wall_fill_each_other(void)
+{
+  for (uint64_t seed = 1; seed <= SEEDS; seed++)
+    for (int faces = 0; faces < 2; faces++) {
+      uint64_t     s     = seed;
+      const double angle = uniform(&s, 0, 6);
+      const result r = overlay_once(tm_hexahedra((int[]){6, 6, 5}, to_curved_wall, &angle), tm_hexahedra((int[]){6, 6, 7}, to_curved_wall, &angle), faces);
+      RT_NEAR(r.stats.overlap_volume, r.stats.volume[0], 1e-6 * r.stats.volume[0]); /* radii are rounded, each for itself */
+      RT_CHECK(r.stats.pairs >= 36 * 11);
+      RT_EQ(r.stats.cells_by_cover[0][REMAP_UNCOVERED] + r.stats.cells_by_cover[1][REMAP_UNCOVERED], 0);
+    }
+}
+
+/* The middle of each axis moves to 1e-3 of its length. */
+static void to_uneven(double x[3], const void *unused)
+{
+  (void)unused;
+  for (int k = 0; k < 3; k++) x[k] = x[k] <= 0.5 ? 2e-3 * x[k] : 1e-3 + (x[k] - 0.5) * 1.998;
+}
+
+static void neighbours_a_thousand_million_times_larger_do_not_matter(void)
+{
+  const result r = overlay_once(tm_hexahedra((int[]){2, 2, 2}, to_uneven, NULL), tm_hexahedra((int[]){4, 4, 4}, to_uneven, NULL), REMAP_FACES_CENTRE);
+  RT_NEAR(r.stats.overlap_volume, 1, 1e-14);
+  RT_EQ(r.stats.pairs, 64);
+  for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+    uint64_t     s = seed;
+    double       m[12];
+    tm_mesh     *other = warped(4, &s);
+    random_motion(&s, 4e-3, (double[3]){1e-3, 1e-3, 1e-3}, m); /* across the small cell and into its large neighbours */
+    for (int k = 0; k < 3; k++) m[4 * k + 3] -= 0.5 * (m[4 * k] + m[4 * k + 1] + m[4 * k + 2]);
+    tm_move(other, tm_affine, m);
+    RT_CHECK(overlay_once(tm_hexahedra((int[]){2, 2, 2}, to_uneven, NULL), other, REMAP_FACES_DIAGONAL).stats.pairs > 8);
+  }
+}
+
+RT_MAIN(RT_CASE(layers_of_pancakes_on_a_curved_wall_fill_each_other), RT_CASE(neighbours_a_thousand_million_times_larger_do_not_matter),
+        RT_CASE(the_unit_of_length_does_not_matter), RT_CASE(a_place_far_from_the_origin_does_not_matter),
         RT_CASE(a_mesh_inside_one_cell_of_the_other_is_wholly_mapped), RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap),
         RT_CASE(cells_a_million_times_smaller_are_not_dropped), RT_CASE(rotated_boxes_share_the_volume_known),
         RT_CASE(warped_faces_lose_nothing_on_either_side), RT_CASE(disjoint_and_touching_meshes_share_nothing),
