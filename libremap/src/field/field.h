@@ -1,4 +1,4 @@
-/* field -- mapping and the caller's values in; the receiving cells' values out (DESIGN 4): reconstruction of order 1 or 2,
+/* field -- mapping and the caller's values in; the receiving cells' values out (DESIGN 4): reconstruction of order 1 to 3,
  * limiter, coverage policies, integrals. */
 #ifndef RM_FIELD_H
 #define RM_FIELD_H

@@ -8,7 +8,7 @@
  * smallest one that fits, where numbers are short and quick.
  *
  * Values are functions of their arguments; nothing is allocated. Cost: O(limbs) for sums, O(limbs a times limbs b) for products;
- * a determinant of coordinates takes about 250 ns. Only the limbs in use are written or read. Shared by geom and overlay. */
+ * a determinant of coordinates takes about 250 ns. Only the limbs in use are written or read. Shared by geom, moments and cells. */
 #ifndef RM_GEOM_EXACT_H
 #define RM_GEOM_EXACT_H
 
