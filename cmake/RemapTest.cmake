@@ -61,11 +61,16 @@ function(remap_test room thing)
   remap_mpi_test(${room} ${thing} ${exe} RANKS ${T_RANKS} TIMEOUT ${T_TIMEOUT})
 endfunction()
 
-# remap_bench(<thing> [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not run.
+# remap_bench(<thing> [HEAP] [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not run.
+# HEAP: it counts the memory that it and the library hold.
 function(remap_bench thing)
-  cmake_parse_arguments(PARSE_ARGV 1 T "" "" "LIBS")
+  cmake_parse_arguments(PARSE_ARGV 1 T "HEAP" "" "LIBS")
   add_executable(bench_${thing} bench/bench_${thing}.c)
   remap_test_program(bench_${thing} bench/bench_${thing}.c ${T_LIBS})
+  if(T_HEAP)
+    target_compile_definitions(bench_${thing} PRIVATE BENCH_HEAP)
+    target_link_options(bench_${thing} PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wrap=free)
+  endif()
 endfunction()
 
 # remap_fuzz(<thing> COUNT <inputs> [RANKS 1 2 ...] [LIBS <targets>]): tests/fuzz/fuzz_<thing>.c as the program fuzz_<thing>. CTest

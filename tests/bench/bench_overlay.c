@@ -1,119 +1,80 @@
-/* bench_overlay -- time of the overlay (crossings, segments, volumes and first moments of triangulated meshes in memory, one rank)
- * on the meshes of DESIGN section 6 and on those where every face coincides. One JSON line; microseconds of user CPU per cell of
- * mesh 1 and per pair, medians.
+/* bench_overlay -- time and memory of the overlay stage by stage on one rank: triangulation, crossings and segments, volumes and
+ * first moments of triangulated meshes in memory; "overlay" is the sum of the last two. One JSON line; microseconds of processor
+ * time per cell of mesh 1, medians; wall clock of the overlay; bytes of heap that triangulation, overlay and moments take
+ * together, at the peak, per cell of mesh 2; a hash of the bits of all V and M, whatever the order of the pairs.
  *
- *   bench_overlay CASE N diagonal|centre [REPEATS]
- *
- *   warped       N^3 warped hexahedra, rotated, inside (2N)^3 larger by two: those of overlay_floor.c
- *   identical    N^3 warped hexahedra on themselves          nested     N^3 boxes on (2N)^3
- *   shifted      N^3 boxes, half a cell apart                abutting   N^3 boxes beside N^3 boxes
- *   boxes        N^3 boxes, rotated, inside (2N)^3           tetrahedra 6 N^3, warped, rotated, inside 6 (2N)^3
- *   dual         duals of such tetrahedra                    pancakes   N^3 warped hexahedra on (N+1)^3, all 10^4 times thinner in z, rotated */
-#include <time.h>
+ *   bench_overlay CASE N diagonal|centre [REPEATS]      cases: bench.h */
+#include "bench.h"
 #include "laid.h"
 
-static double cpu_seconds(void)
+enum { TRIANGULATION, TRACE, MOMENTS, OVERLAY, WALL, NUM_TIMES };
+
+/* Measure all stages once; what they made goes again. */
+static remap_status measure(laid *l, remap_faces faces, double seconds[NUM_TIMES], double *peak_bytes)
 {
-  struct timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+  rm_arena         *arena = rm_arena_new();
+  const rm_trimesh *mesh[2];
+  const rm_overlay *o;
+  const rm_moments *m;
+  remap_status      status = arena ? REMAP_OK : REMAP_NO_MEMORY;
+  const double      held = bench_heap_start(), t0 = bench_cpu();
+
+  for (int side = 0; side < 2 && status == REMAP_OK; side++)
+    status = rm_trimesh_build(arena, &l->frame, &l->part.piece[side], faces, &mesh[side]);
+  const double t1 = bench_cpu(), wall = bench_wall();
+  if (status == REMAP_OK) status = rm_overlay_build(arena, mesh, &l->part, NULL, &o, &l->reason);
+  const double t2 = bench_cpu();
+  if (status == REMAP_OK) status = rm_moments_build(arena, &l->part, o, 1, &m);
+  const double t3 = bench_cpu();
+  seconds[TRIANGULATION] = t1 - t0, seconds[TRACE] = t2 - t1, seconds[MOMENTS] = t3 - t2, seconds[OVERLAY] = t3 - t1;
+  seconds[WALL] = bench_wall() - wall;
+  *peak_bytes   = bench_heap_peak() - held;
+  rm_arena_drop(arena);
+  return status;
 }
 
-/* Centred, rotated about z and x, scaled: as overlay_floor.c does it. */
-static tm_mesh *placed(tm_mesh *mesh, double angle, double scale)
+static uint64_t hash_of(const rm_moments *m)
 {
-  const double c = cos(angle), s = sin(angle);
-  const double m[12] = {scale * c,     -scale * s,    0,          scale * (s - c) / 2,
-                        scale * c * s, scale * c * c, -scale * s, -scale * (c * s + c * c - s) / 2,
-                        scale * s * s, scale * s * c, scale * c,  -scale * (s * s + s * c + c) / 2};
-  tm_move(mesh, tm_affine, m);
-  return mesh;
-}
+  uint64_t sum = 0;
 
-typedef tm_mesh *maker(const int n[3], tm_map map, const void *data);
-
-static bool make_meshes(const char *name, int n, tm_mesh *mesh[2])
-{
-  static const tm_warping first = {0.03, 0.7}, second = {0.03, 0.1};
-  const int fine[3] = {2 * n, 2 * n, 2 * n}, coarse[3] = {n, n, n}, next[3] = {n + 1, n + 1, n + 1};
-
-  if (!strcmp(name, "warped")) {
-    mesh[0] = tm_benchmark(n, 0.7, 0.3, 0.5), mesh[1] = tm_benchmark(2 * n, 0.1, 0, 1);
-  } else if (!strcmp(name, "identical")) {
-    for (int side = 0; side < 2; side++) mesh[side] = tm_hexahedra(coarse, tm_warp, &first);
-  } else if (!strcmp(name, "nested")) {
-    mesh[0] = tm_hexahedra(coarse, NULL, NULL), mesh[1] = tm_hexahedra(fine, NULL, NULL);
-  } else if (!strcmp(name, "shifted") || !strcmp(name, "abutting")) {
-    const double by = name[0] == 's' ? 0.5 / n : 1, m[12] = {1, 0, 0, by, 0, 1, 0, name[0] == 's' ? by : 0, 0, 0, 1, name[0] == 's' ? by : 0};
-    mesh[0] = tm_hexahedra(coarse, NULL, NULL), mesh[1] = tm_hexahedra(coarse, tm_affine, m);
-  } else if (!strcmp(name, "boxes")) {
-    mesh[0] = placed(tm_hexahedra(coarse, NULL, NULL), 0.3, 0.5), mesh[1] = placed(tm_hexahedra(fine, NULL, NULL), 0, 1);
-  } else if (!strcmp(name, "tetrahedra") || !strcmp(name, "dual")) {
-    maker *make = name[0] == 't' ? tm_tetrahedra : tm_dual;
-    mesh[0] = placed(make(coarse, tm_warp, &first), 0.3, 0.5), mesh[1] = placed(make(fine, tm_warp, &second), 0, 1);
-  } else if (!strcmp(name, "pancakes")) {
-    const double thin[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-4, 0};
-    mesh[0] = tm_hexahedra(coarse, tm_warp, &first), mesh[1] = tm_hexahedra(next, tm_warp, &second);
-    for (int side = 0; side < 2; side++) tm_move(mesh[side], tm_affine, thin), placed(mesh[side], 0.3, 1);
-  } else {
-    return false;
+  for (int64_t k = 0; k < m->num_pairs; k++) {
+    uint64_t     h    = rm_hash_word((uint64_t)m->source[k] << 32 | (uint64_t)m->target[k]), bits;
+    const double x[4] = {m->volume[k], m->moment[k][0], m->moment[k][1], m->moment[k][2]};
+    for (int c = 0; c < 4; c++) memcpy(&bits, &x[c], sizeof bits), h = rm_hash_word(h ^ bits);
+    sum += rm_hash_word(h ^ m->flags[k]);
   }
-  return true;
-}
-
-static int by_value(const void *a, const void *b)
-{
-  const double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-static double median(double *x, int n)
-{
-  qsort(x, (size_t)n, sizeof *x, by_value);
-  return x[n / 2];
+  return sum;
 }
 
 int main(int argc, char **argv)
 {
-  const int         repeats = argc > 4 ? atoi(argv[4]) : 1;
-  const remap_faces faces   = argc > 3 && !strcmp(argv[3], "centre") ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL;
-  tm_mesh          *mesh[2];
+  const int repeats = argc > 4 ? atoi(argv[4]) : 1, faces = argc > 3 ? bench_faces(argv[3]) : -1;
+  tm_mesh  *mesh[2];
+  double    peak = 0, once[NUM_TIMES], us[NUM_TIMES];
 
-  if (argc < 4 || atoi(argv[2]) < 1 || repeats < 1 || !make_meshes(argv[1], atoi(argv[2]), mesh))
-    return fprintf(stderr, "usage: bench_overlay warped|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes N diagonal|centre [REPEATS]\n"), 2;
+  if (faces < 0 || atoi(argv[2]) < 1 || repeats < 1 || !bench_meshes(argv[1], atoi(argv[2]), mesh))
+    return fprintf(stderr, "usage: bench_overlay " BENCH_CASES " N diagonal|centre [REPEATS]\n"), 2;
 
-  laid   *l     = laid_over(mesh[0], mesh[1], faces, NULL);
-  double *trace = tm_alloc_(3 * repeats, sizeof *trace), *sum = trace + repeats, *triangulate = sum + repeats;
-  size_t  bytes = 0;
-
+  laid   *l    = laid_over(mesh[0], mesh[1], (remap_faces)faces, NULL);
+  double *time = tm_alloc_(NUM_TIMES * repeats, sizeof *time);
   for (int r = 0; r < repeats && l->status == REMAP_OK; r++) {
-    rm_arena         *arena = rm_arena_new();
-    const rm_trimesh *again[2];
-    const rm_overlay *o;
-    const rm_moments *m;
-    const double      t0 = cpu_seconds();
-
-    for (int side = 0; side < 2 && l->status == REMAP_OK; side++)
-      l->status = rm_trimesh_build(arena, &l->frame, &l->part.piece[side], faces, &again[side]);
-    const double t1 = cpu_seconds();
-    if (l->status == REMAP_OK) l->status = rm_overlay_build(arena, again, &l->part, NULL, &o, &l->reason);
-    const double t2 = cpu_seconds();
-    if (l->status == REMAP_OK) l->status = rm_moments_build(arena, &l->part, o, 1, &m);
-    const double t3 = cpu_seconds();
-    triangulate[r] = t1 - t0, trace[r] = t2 - t1, sum[r] = t3 - t2;
-    bytes = rm_arena_bytes(arena);
-    rm_arena_drop(arena);
+    l->status = measure(l, (remap_faces)faces, once, &peak);
+    for (int k = 0; k < NUM_TIMES; k++) time[k * repeats + r] = once[k];
   }
   if (l->status != REMAP_OK) return fprintf(stderr, "%s: %s\n", remap_status_text(l->status), l->reason.text), 1;
 
-  const double  cells = l->part.piece[0].num_cells, pairs = (double)l->moments->num_pairs;
-  const int64_t crossings = l->overlay->trace[0].num_crossings + l->overlay->trace[1].num_crossings;
-  const double  us_trace = 1e6 * median(trace, repeats), us_sum = 1e6 * median(sum, repeats);
-  printf("{\"bench\":\"overlay\",\"case\":\"%s\",\"faces\":\"%s\",\"cells\":[%d,%d],\"crossings\":%lld,\"pairs\":%.0f,\"us_crossings_segments\":%.2f,"
-         "\"us_moments\":%.2f,\"us_overlay\":%.2f,\"us_per_pair\":%.2f,\"us_triangulation\":%.2f,\"bytes\":%.0f}\n",
-         argv[1], argv[3], l->part.piece[0].num_cells, l->part.piece[1].num_cells, (long long)crossings, pairs, us_trace / cells, us_sum / cells,
-         (us_trace + us_sum) / cells, pairs > 0 ? (us_trace + us_sum) / pairs : 0, 1e6 * median(triangulate, repeats) / cells, (double)bytes / cells);
+  const rm_lid   *cells = (rm_lid[]){l->part.piece[0].num_cells, l->part.piece[1].num_cells};
+  const rm_trace *trace = l->overlay->trace;
+  const double    pairs = (double)l->moments->num_pairs;
+  for (int k = 0; k < NUM_TIMES; k++) us[k] = 1e6 * bench_median(time + k * repeats, repeats) / cells[0];
+  printf("{\"bench\":\"overlay\",\"case\":\"%s\",\"n\":%s,\"faces\":\"%s\",\"cells\":[%d,%d],\"crossings\":%lld,\"segments\":%lld,\"pairs\":%.0f,"
+         "\"us_triangulation\":%.2f,\"us_crossings_segments\":%.2f,\"us_moments\":%.2f,\"us_overlay\":%.2f,\"us_overlay_wall\":%.2f,"
+         "\"us_per_pair\":%.3f,\"peak_bytes_per_target_cell\":%.0f,\"hash\":\"%016llx\"}\n",
+         argv[1], argv[2], argv[3], cells[0], cells[1], (long long)(trace[0].num_crossings + trace[1].num_crossings),
+         (long long)(l->overlay->end_offset[l->mesh[0]->num_triangles] / 2), pairs, us[TRIANGULATION], us[TRACE], us[MOMENTS], us[OVERLAY],
+         us[WALL], pairs > 0 ? us[OVERLAY] * cells[0] / pairs : 0, peak / cells[1], (unsigned long long)hash_of(l->moments));
   laid_free(l);
   tm_free(mesh[0]), tm_free(mesh[1]);
-  free(trace);
+  free(time);
   return 0;
 }
