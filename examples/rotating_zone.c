@@ -176,7 +176,7 @@ static remap_status step(remap_context *ctx, zone zones[2], double angle, outcom
   const double       c = cos(angle), s = sin(angle), half = .5;
   const double       turn[12]  = {c, -s, 0, half - c * half + s * half, s, c, 0, half - s * half - c * half, 0, 0, 1, 0};
   const remap_motion motion[2] = {{NULL, NULL}, {NULL, turn}};
-  const remap_masks  masks     = {{zones[BOX].gives, zones[RING].gives}, {zones[BOX].wants, zones[RING].wants}};
+  const remap_masks  masks     = {.gives = {zones[BOX].gives, zones[RING].gives}, .wants = {zones[BOX].wants, zones[RING].wants}};
   remap_field_desc   field[2];
   remap_transfer     how;
   remap_status       status;

@@ -73,7 +73,7 @@ static remap_status run(world *w, bool moves)
 {
   static const double turned[12] = {1, 0, 0, .01, 0, 1, 0, 0, 0, 0, 1, 0};
   const remap_motion  motion[2]  = {{NULL, turned}, {NULL, NULL}};
-  const remap_masks   masks      = {{w->mask[0], NULL}, {NULL, w->mask[1]}};
+  const remap_masks   masks      = {.gives = {w->mask[0], NULL}, .wants = {NULL, w->mask[1]}};
   remap_transfer      how;
   remap_status        status;
 

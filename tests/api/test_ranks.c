@@ -52,7 +52,7 @@ static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids)
   RT_EQ(remap_build(w->ctx), REMAP_OK);
   if (seed % 2) RT_EQ(remap_move(w->ctx, motion), REMAP_OK);
   if (seed % 3 == 1) {
-    const remap_masks masks = {{gives[0], gives[1]}, {wants[0], wants[1]}};
+    const remap_masks masks = {.gives = {gives[0], gives[1]}, .wants = {wants[0], wants[1]}};
     RT_EQ(remap_set_masks(w->ctx, &masks), REMAP_OK);
   }
   for (int side = 0; side < 2; side++) free(gives[side]), free(wants[side]);

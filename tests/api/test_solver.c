@@ -411,7 +411,7 @@ static void masked_cells_are_as_good_as_not_there(void)
 
   if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 19)) {
     uint8_t     *mask[2];
-    remap_masks  masks = {{NULL, NULL}, {NULL, NULL}};
+    remap_masks  masks = {.gives = {NULL, NULL}};
     double      *got = tm_alloc_(w.cells[1], sizeof *got), *want = tm_alloc_(w.cells[1], sizeof *want);
     remap_cover *cover[2];
     int         *deal = tm_deal(w.whole[0], rt_size(), TM_RANDOM, 19);

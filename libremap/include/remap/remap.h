@@ -6,6 +6,7 @@
  *   remap_build       overlay the two meshes                         (collective)
  *   remap_move        overlay them again in a new position           (collective)
  *   remap_set_masks   say which cells give and which want values     (collective)
+ *   remap_partial_cells  where coverage is worst                     (collective)
  *   remap_field       move cell fields across, either way            (by all ranks; among neighbours)
  *   remap_destroy     give everything back                           (collective)
  *
@@ -208,6 +209,8 @@ typedef struct remap_motion {
 typedef struct remap_masks {
   const uint8_t *gives[2]; /**< [side] has values that others may use: 0 in holes and fringes               */
   const uint8_t *wants[2]; /**< [side] values are to be written: 0 in holes and where the own solver works */
+  double min_coverage[2];  /**< [side] receiving cells that are covered in part, by less than this share, lose their pairs and
+                                count as uncovered; 0..1, the same on every rank                            */
 } remap_masks;
 
 /** What a field's transfer did, over all ranks. */
@@ -231,6 +234,7 @@ typedef struct remap_stats {
   int64_t pairs;                  /**< (source cell, target cell) that share volume */
   double  overlap_volume;         /**< sum of V over the pairs */
   int64_t cells_by_cover[2][3];   /**< [side][remap_cover] */
+  double  volume_by_cover[2][3];  /**< [side][remap_cover] sum of abs(volume) of those cells, whole cells */
   double  max_closure_error[2];   /**< [side] largest abs(sum of V over the cell's pairs / cell volume - 1), covered cells */
   int64_t worst_closure_cell[2];  /**< [side] its global id, -1 if none is covered */
   double  zone_overlap[2];        /**< [side] largest volume shared by two cells of different zones of the mesh, where they
@@ -254,6 +258,13 @@ typedef struct remap_pairs_view {
   const uint8_t *same;       /**< [same] 1: the two cells cover each other alone */
   const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 */
 } remap_pairs_view;
+
+/** A cell that is covered in part. */
+typedef struct remap_partial_cell {
+  int64_t global_cell;
+  double  fraction, volume; /**< covered share of the cell's volume; that volume */
+  double  centroid[3];
+} remap_partial_cell;
 
 /** A short text for a status; static text, never NULL. Not collective. */
 REMAP_API const char *remap_status_text(remap_status status);
@@ -300,8 +311,9 @@ REMAP_API remap_status remap_move(remap_context *ctx, const remap_motion motion[
 /** Say which cells take part in transfers. Collective, after remap_build; masks hold until the next remap_build, remap_move
  *  or call, and are copied. A pair of cells counts if the one gives and the other wants: coverage, pairs, integrals and
  *  reconstruction know no others, so what a masked cell holds is never read, not even as a neighbour, and a cell that does
- *  not want is never written. NULL: no masks. remap_stats stays as it is.
- *  Errors: BAD_ORDER (no overlay, or a transfer under way), NO_MEMORY, MPI_FAILURE. */
+ *  not want is never written. What is left of a receiving cell's coverage is then held against min_coverage. NULL: no masks.
+ *  remap_stats stays as it is.
+ *  Errors: BAD_ORDER (no overlay, or a transfer under way), BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *masks);
 
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
@@ -349,6 +361,12 @@ REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side,
  *  ascending. Not collective. num receives their number; cell [*num] is the caller's and may be NULL.
  *  Errors: BAD_ORDER, BAD_ARGUMENT. */
 REMAP_API remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
+
+/** The cells of one side, over all ranks, that are covered in part and least of all: ascending by fraction. Collective; the same on
+ *  every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in it. Masks
+ *  count as in remap_coverage.
+ *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
+REMAP_API remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, remap_partial_cell *cell);
 
 /** Volumes (signed: negative for an inverted cell) and centroids of the cells of one side. Not collective. volume [cells]
  *  and centroid [cells][3] are the caller's; either may be NULL. Errors: BAD_ORDER. */

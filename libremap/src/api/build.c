@@ -94,7 +94,10 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
     s->max_closure_error[side]  = m->max_closure_error[side];
     s->worst_closure_cell[side] = m->worst_closure_cell[side];
     s->zone_overlap[side] *= cubed;
-    for (int c = 0; c < 3; c++) s->cells_by_cover[side][c] = m->cells_by_cover[side][c];
+    for (int c = 0; c < 3; c++) {
+      s->cells_by_cover[side][c]  = m->cells_by_cover[side][c];
+      s->volume_by_cover[side][c] = m->volume_by_cover[side][c] * cubed;
+    }
   }
   return REMAP_OK;
 }

@@ -1,6 +1,7 @@
 /* masks -- which cells give and which want, and what of the overlay is left. O(pairs). */
 #include "api/context.h"
 
+#include <math.h>
 #include <string.h>
 
 void rm_context_drop_masks(remap_context *ctx)
@@ -28,18 +29,62 @@ static remap_status copy_mask(rm_arena *arena, const uint8_t *given, rm_lid n, c
   return REMAP_OK;
 }
 
+/* What a side's cells are worth as receivers: those covered by less than `least` have no pairs. */
+static remap_status find_bare(rm_arena *arena, const rm_mesh *mesh, const rm_rows *rows, double least, uint8_t **out)
+{
+  uint8_t *mask;
+
+  RM_NEW(mask, arena, rows->num_cells);
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    const bool is_bare = rows->cover[c] == REMAP_PARTIAL && fabs(rm_row_volume(rows, c)) < least * fabs(mesh->cell_volume[c]);
+
+    mask[c] = rows->cover[c] == REMAP_UNWANTED ? RM_MASK_OUT : is_bare ? RM_MASK_BARE : RM_MASK_IN;
+  }
+  *out = mask;
+  return REMAP_OK;
+}
+
+/* Take the pairs of cells that are covered too little out of one direction. Collective. */
+static remap_status strip(remap_context *ctx, remap_direction direction, double least, rm_reason *reason)
+{
+  const remap_side  receiving = direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE, giving = 1 - receiving;
+  const rm_mapping *mapping   = ctx->masked[direction];
+  uint8_t          *wants = NULL, *gives = NULL;
+  remap_status      status = find_bare(ctx->mask_arena, ctx->mesh[receiving], &mapping->rows[receiving], least, &wants);
+
+  if (status == REMAP_OK) status = find_bare(ctx->mask_arena, ctx->mesh[giving], &mapping->rows[giving], 0.0, &gives);
+  RM_TRY(rm_comm_agree_reason(&ctx->comm, status, reason));
+  return rm_mapping_mask(ctx->mask_arena, &ctx->comm, mapping, receiving, wants, gives, &ctx->masked[direction]);
+}
+
+/* The same, within 0..1, on every rank? Collective. */
+static remap_status check_least(const remap_context *ctx, const double least[2], rm_reason *reason)
+{
+  double extreme[4] = {least[0], -least[0], least[1], -least[1]};
+
+  for (int side = 0; side < 2; side++)
+    if (!(least[side] >= 0.0 && least[side] <= 1.0)) extreme[2 * side] = extreme[2 * side + 1] = 2.0;
+  RM_TRY(rm_comm_max_f64(&ctx->comm, extreme, 4));
+  for (int side = 0; side < 2; side++)
+    if (extreme[2 * side] > -extreme[2 * side + 1] || extreme[2 * side] > 1.0)
+      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "min_coverage is within 0..1 and the same on every rank");
+  return REMAP_OK;
+}
+
 /* Collective. */
 static remap_status apply(remap_context *ctx, const remap_masks *masks, rm_reason *reason)
 {
+  const double least[2] = {masks ? masks->min_coverage[0] : 0.0, masks ? masks->min_coverage[1] : 0.0};
   int64_t      any[4]; /* given on some rank: gives by side, wants by side */
   remap_status status = REMAP_OK;
 
+  RM_TRY(check_least(ctx, least, reason));
   for (int side = 0; side < 2; side++) {
     any[side]     = masks && masks->gives[side];
     any[2 + side] = masks && masks->wants[side];
   }
   RM_TRY(rm_comm_max_i64(&ctx->comm, any, 4));
-  if (!any[0] && !any[1] && !any[2] && !any[3]) return REMAP_OK;
+  if (!any[0] && !any[1] && !any[2] && !any[3] && !(least[0] > 0.0) && !(least[1] > 0.0)) return REMAP_OK;
   ctx->mask_arena = rm_arena_new();
   if (!ctx->mask_arena) status = REMAP_NO_MEMORY;
   for (int side = 0; side < 2; side++) {
@@ -55,6 +100,7 @@ static remap_status apply(remap_context *ctx, const remap_masks *masks, rm_reaso
     if (any[giving] || any[2 + receiving])
       RM_TRY(rm_mapping_mask(ctx->mask_arena, &ctx->comm, ctx->mapping, receiving, ctx->wants[receiving], ctx->gives[giving],
                              &ctx->masked[d]));
+    if (least[receiving] > 0.0) RM_TRY(strip(ctx, (remap_direction)d, least[receiving], reason));
   }
   for (int side = 0; side < 2; side++) { /* what masks nothing needs no stencil of its own */
     if (!any[side]) ctx->gives[side] = NULL;

@@ -1,6 +1,9 @@
 /* views -- what callers may look at after remap_build, in their own unit. */
 #include "api/context.h"
 
+#include <math.h>
+#include <stdlib.h>
+
 /* The pairs of a side's cells as receivers, those of masked cells left out. */
 static const rm_rows *rows_of(const remap_context *ctx, remap_side side)
 {
@@ -31,6 +34,14 @@ remap_status remap_cells(const remap_context *ctx, remap_side side, double *volu
   return REMAP_OK;
 }
 
+/* The share of a cell that its pairs cover. */
+static double fraction_of(const remap_context *ctx, remap_side side, const rm_rows *rows, rm_lid cell)
+{
+  const double own = ctx->mesh[side]->cell_volume[cell];
+
+  return rows->cover[cell] == REMAP_COVERED ? 1 : fabs(own) > 0 ? rm_row_volume(rows, cell) / own : 0;
+}
+
 remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover)
 {
   RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
@@ -38,10 +49,7 @@ remap_status remap_coverage(const remap_context *ctx, remap_side side, double *f
   const rm_rows *rows = rows_of(ctx, side);
 
   for (rm_lid c = 0; c < rows->num_cells; c++) {
-    double sum = 0;
-    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++) sum += rows->volume[k];
-    const double own = ctx->mesh[side]->cell_volume[c];
-    if (fraction) fraction[c] = rows->cover[c] == REMAP_COVERED ? 1 : own != 0 ? sum / own : 0;
+    if (fraction) fraction[c] = fraction_of(ctx, side, rows, c);
     if (cover) cover[c] = (remap_cover)rows->cover[c];
   }
   return REMAP_OK;
@@ -61,6 +69,75 @@ remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t 
   }
   *num = n;
   return REMAP_OK;
+}
+
+/* Ascending by coverage; equal ones by place, then by global id. */
+static int compare_partial(const void *first, const void *second)
+{
+  const remap_partial_cell *a = first, *b = second;
+
+  if (a->fraction < b->fraction || a->fraction > b->fraction) return a->fraction < b->fraction ? -1 : 1;
+  for (int d = 0; d < 3; d++)
+    if (a->centroid[d] < b->centroid[d] || a->centroid[d] > b->centroid[d]) return a->centroid[d] < b->centroid[d] ? -1 : 1;
+  return (a->global_cell > b->global_cell) - (a->global_cell < b->global_cell);
+}
+
+/* This rank's partial cells, sorted. */
+static remap_status list_partial(rm_arena *scratch, const remap_context *ctx, remap_side side, int64_t *num,
+                                 remap_partial_cell **out)
+{
+  const rm_rows *rows = rows_of(ctx, side);
+  const rm_mesh *mesh = ctx->mesh[side];
+  const double   unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+
+  *num = 0;
+  for (rm_lid c = 0; c < rows->num_cells; c++) *num += rows->cover[c] == REMAP_PARTIAL;
+  RM_NEW(*out, scratch, *num);
+  *num = 0;
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    const double *x = mesh->cell_centroid[c];
+
+    if (rows->cover[c] != REMAP_PARTIAL) continue;
+    (*out)[(*num)++] = (remap_partial_cell){mesh->cell_global[c], fraction_of(ctx, side, rows, c), mesh->cell_volume[c] * cubed,
+                                            {x[0] * unit, x[1] * unit, x[2] * unit}};
+  }
+  qsort(*out, (size_t)*num, sizeof **out, compare_partial);
+  return REMAP_OK;
+}
+
+/* Collective. */
+static remap_status gather_partial(rm_arena *scratch, const remap_context *ctx, remap_side side, int most, int *num,
+                                   remap_partial_cell *cell)
+{
+  int64_t            *offset = rm_arena_alloc(scratch, (int64_t)ctx->comm.size + 1, sizeof *offset), own = 0, all;
+  remap_partial_cell *mine   = NULL;
+  void               *got    = NULL;
+  remap_status        status = offset ? list_partial(scratch, ctx, side, &own, &mine) : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(&ctx->comm, status, NULL));
+  RM_ASSERT(offset && mine);
+  RM_TRY(rm_comm_allgatherv(&ctx->comm, scratch, mine, own < most ? own : most, sizeof *mine, offset, &got));
+  all = offset[ctx->comm.size];
+  qsort(got, (size_t)all, sizeof *mine, compare_partial);
+  *num = (int)(all < most ? all : most);
+  for (int k = 0; k < *num; k++) cell[k] = ((const remap_partial_cell *)got)[k];
+  return REMAP_OK;
+}
+
+remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, remap_partial_cell *cell)
+{
+  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  rm_arena    *scratch = rm_arena_new();
+  int64_t      room[2] = {num ? *num : -1, num ? -*num : 1};
+  remap_status status  = !scratch ? REMAP_NO_MEMORY : room[0] < 0 || (room[0] > 0 && !cell) ? REMAP_BAD_ARGUMENT : REMAP_OK;
+
+  RM_GOTO(done, status = rm_comm_agree(&ctx->comm, status, NULL));
+  RM_GOTO(done, status = rm_comm_max_i64(&ctx->comm, room, 2));
+  status = room[0] == -room[1] ? gather_partial(scratch, ctx, side, (int)room[0], num, cell) : REMAP_BAD_ARGUMENT;
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
 remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out)

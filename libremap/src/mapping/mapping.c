@@ -368,20 +368,23 @@ static remap_status count_all(const rm_comm *comm, const rm_mesh *const mesh[2],
 {
   int64_t count[7] = {0}, smallest[2];
   double  worst[2];
-  rm_sum  overlap;
+  rm_sum  volume[7]; /* [side][cover], overlap */
 
-  rm_sum_clear(&overlap);
+  for (int k = 0; k < 7; k++) rm_sum_clear(&volume[k]);
   for (int side = 0; side < 2; side++) {
     const rm_rows *rows = &mapping->rows[side];
 
-    for (rm_lid c = 0; c < rows->num_cells; c++) count[3 * side + rows->cover[c]]++;
+    for (rm_lid c = 0; c < rows->num_cells; c++) {
+      count[3 * side + rows->cover[c]]++;
+      rm_sum_add(&volume[3 * side + rows->cover[c]], fabs(mesh[side]->cell_volume[c]));
+    }
     worst[side] = mapping->max_closure_error[side] = worst_closure(rows, mesh[side], &mapping->worst_closure_cell[side]);
   }
   count[6] = mapping->rows[REMAP_TARGET].offset[mapping->rows[REMAP_TARGET].num_cells];
-  for (int64_t k = 0; k < count[6]; k++) rm_sum_add(&overlap, mapping->rows[REMAP_TARGET].volume[k]);
+  for (int64_t k = 0; k < count[6]; k++) rm_sum_add(&volume[6], mapping->rows[REMAP_TARGET].volume[k]);
   RM_TRY(rm_comm_sum_i64(comm, count, 7));
   RM_TRY(rm_comm_max_f64(comm, mapping->max_closure_error, 2));
-  RM_TRY(rm_comm_sum_exact(comm, &overlap, 1));
+  RM_TRY(rm_comm_sum_exact(comm, volume, 7));
   for (int side = 0; side < 2; side++) { /* the greatest negative id is the smallest one */
     const rm_gid cell = mapping->worst_closure_cell[side];
 
@@ -390,10 +393,13 @@ static remap_status count_all(const rm_comm *comm, const rm_mesh *const mesh[2],
   RM_TRY(rm_comm_max_i64(comm, smallest, 2));
   for (int side = 0; side < 2; side++) {
     mapping->worst_closure_cell[side] = smallest[side] == INT64_MIN ? -1 : -smallest[side];
-    for (int cover = 0; cover < 3; cover++) mapping->cells_by_cover[side][cover] = count[3 * side + cover];
+    for (int cover = 0; cover < 3; cover++) {
+      mapping->cells_by_cover[side][cover]  = count[3 * side + cover];
+      mapping->volume_by_cover[side][cover] = rm_sum_value(&volume[3 * side + cover]);
+    }
   }
   mapping->num_pairs      = count[6];
-  mapping->overlap_volume = rm_sum_value(&overlap);
+  mapping->overlap_volume = rm_sum_value(&volume[6]);
   return REMAP_OK;
 }
 

@@ -40,6 +40,7 @@ typedef struct rm_mapping {
   rm_gid  num_pairs;                 /* over all ranks                                    */
   double  overlap_volume;            /* over all ranks, exact sum rounded once, own frame */
   rm_gid  cells_by_cover[2][3];      /* over all ranks [side][remap_cover]                */
+  double  volume_by_cover[2][3];     /* likewise, sums of abs(volume); not those of rm_mapping_mask */
   double  max_closure_error[2];      /* over all ranks, covered cells                     */
   rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
 } rm_mapping;
@@ -48,8 +49,11 @@ typedef struct rm_mapping {
  * leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
+/* What a mask says of a cell: it takes no part; it does; it does, but has no pairs. */
+enum { RM_MASK_OUT = 0, RM_MASK_IN = 1, RM_MASK_BARE = 2 };
+
 /* The same mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving cells] and
- * gives [giving cells], 0 is no. Of the receiving side: cells that do not want are UNWANTED, without pairs; others lose pairs, and
+ * gives [giving cells], both RM_MASK_IN. Of the receiving side: cells that are OUT are UNWANTED, without pairs; others lose pairs, and
  * are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is left. Collective. Lives in
  * arena and borrows from mapping. O(pairs). */
 remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapping *mapping, remap_side receiving,
@@ -69,6 +73,15 @@ static inline void rm_compensated_add(rm_compensated *s, double x)
   s->sum = next;
 }
 static inline double rm_compensated_value(const rm_compensated *s) { return s->sum + s->lost; }
+
+/* Sum of a row's volumes, in row order. */
+static inline double rm_row_volume(const rm_rows *rows, rm_lid cell)
+{
+  rm_compensated sum = {0.0, 0.0};
+
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) rm_compensated_add(&sum, rows->volume[k]);
+  return rm_compensated_value(&sum);
+}
 
 /* Put n cells into canonical order: by the Morton key of the centroid, then centroid, volume and global id, compared in turn; no
  * numbering of a rank takes part. order [n] receives places of the arrays, [n] each. Not collective. Working memory from scratch.

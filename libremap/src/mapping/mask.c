@@ -35,8 +35,8 @@ static void filter(const rm_rows *rows, const uint8_t *own, const uint8_t *other
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     const int64_t first = rows->offset[c], end = rows->offset[c + 1], before = num;
 
-    for (int64_t k = first; k < end && own[c]; k++) {
-      if (!other[rows->giver[k]]) continue;
+    for (int64_t k = first; k < end && own[c] == RM_MASK_IN; k++) {
+      if (other[rows->giver[k]] != RM_MASK_IN) continue;
       d->giver[num]  = rows->giver[k];
       d->volume[num] = rows->volume[k];
       for (int i = 0; i < 3; i++) d->moment[num][i] = rows->moment[k][i];
@@ -44,7 +44,7 @@ static void filter(const rm_rows *rows, const uint8_t *own, const uint8_t *other
       d->same[num++] = rows->same[k];
     }
     d->offset[c + 1] = num;
-    d->cover[c]      = !own[c]                          ? REMAP_UNWANTED
+    d->cover[c]      = own[c] == RM_MASK_OUT             ? REMAP_UNWANTED
                        : num - before == end - first    ? rows->cover[c]
                        : num == before                  ? REMAP_UNCOVERED
                                                         : REMAP_PARTIAL;
