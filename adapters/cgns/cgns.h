@@ -5,6 +5,7 @@
  *   rcgns_mesh             that part, as remap_set_mesh wants it                  (not collective)
  *   rcgns_select_solution  choose the FlowSolution_t whose fields are meant       (collective)
  *   rcgns_read_field       one cell field, in the order of this rank's cells      (collective)
+ *   rcgns_read_cells       one of any node: masks, volumes                        (collective)
  *   rcgns_write            the file's whole tree plus new fields, to a new file   (collective)
  *   rcgns_close            give everything back                                   (collective)
  *   rcgns_create           a small file from nothing: demos and tests             (not collective)
@@ -174,12 +175,18 @@ rcgns_status rcgns_select_solution(rcgns_file *file, const rcgns_choice *choice,
  *  be read), MEMORY. */
 rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values, rcgns_message *message);
 
+/** Read cell values that need not be in the chosen solution, such as masks: name is FIELD or NODE/FIELD, NODE a FlowSolution_t
+ *  or DiscreteData_t; of FIELD alone the first counts, zone by zone: in the chosen solution if it is there, else in the order
+ *  of the file. Collective. values as in rcgns_read_field.
+ *  Errors: USAGE (a zone has no such CellCenter array of its size), IO (it cannot be read), MEMORY. */
+rcgns_status rcgns_read_cells(rcgns_file *file, const char *name, double *values, rcgns_message *message);
+
 /** Refuse an output path that cannot be right: one of the files that `file` was read from, something that is not a regular
  *  file, or a place that cannot be written. Nothing is changed. Collective. Errors: USAGE, IO. */
 rcgns_status rcgns_check_output(const rcgns_file *file, const char *path, rcgns_message *message);
 
-/** Refuse a solution name that rcgns_write would refuse for this target: no name for a node, or the name of a node that cannot take
- *  CellCenter fields. Nothing is changed. Collective. Errors: USAGE. */
+/** Refuse a solution name that rcgns_write would refuse for this target: no name for a node, or the name of a node that cannot
+ *  take CellCenter fields. Nothing is changed. Collective. Errors: USAGE. */
 rcgns_status rcgns_check_solution(rcgns_file *file, const char *solution, rcgns_message *message);
 
 /** Write `path`: everything that `file` (the target) holds, unknown nodes included, as HDF5 with the target's version, plus

@@ -407,34 +407,101 @@ rcgns_status rcgns_select_solution(rcgns_file *file, const rcgns_choice *choice,
   return status;
 }
 
-rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values, rcgns_message *message)
+/* Read one array per zone, array [zones], each of the size of its zone. Collective. */
+static rcgns_status read_arrays(rcgns_file *file, const int64_t *array, double *values, rcgns_message *message)
 {
-  bool known = false;
-
-  message->text[0] = 0;
-  for (int64_t i = 0; i < file->num_fields; i++) known = known || !strcmp(file->field[i].name, name);
-  if (!known) return rc_fail(message, RCGNS_USAGE, "%s: the chosen solution has no field %s", file->path, name);
-  for (int64_t z = 0; z < file->num_zones; z++) { /* say what is wrong before anything is read */
-    const int64_t array = array_of(file, z, name);
-    rc_box        box;
-
-    if (array < 0)
-      return rc_fail(message, RCGNS_IO, "%s: zone %s: field %s is missing there: leave it out (--fields)", file->path,
-                     file->zone[z].name, name);
-    if (!core_of(file, file->zone + z, file->solution[z], array, &box))
-      return rc_fail(message, RCGNS_IO, "%s: zone %s: the size of field %s does not match the zone's %lld cells", file->path,
-                     file->zone[z].name, name, (long long)file->zone[z].num_cells);
-  }
   for (int64_t z = 0; z < file->num_zones; z++) {
-    const rc_zone *zone  = file->zone + z;
-    const int64_t  array = array_of(file, z, name);
-    const int64_t  lo    = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells),
-                  hi     = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
+    const rc_zone *zone = file->zone + z;
+    const int64_t  lo   = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells),
+                  hi    = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
     rc_box box;
 
-    core_of(file, zone, file->solution[z], array, &box);
-    RC_TRY(rc_read(file, RCGNS_OK, array, &box, lo, hi, 'R', values, message));
+    core_of(file, zone, rc_node_at(&file->tree, array[z])->parent, array[z], &box);
+    RC_TRY(rc_read(file, RCGNS_OK, array[z], &box, lo, hi, 'R', values, message));
     if (values) values += hi - lo;
   }
   return RCGNS_OK;
+}
+
+/* The arrays of a field of the chosen solution; what is wrong is said before anything is read. */
+static rcgns_status find_field(const rcgns_file *file, const char *name, int64_t *array, rcgns_message *message)
+{
+  bool known = false;
+
+  for (int64_t i = 0; i < file->num_fields; i++) known = known || !strcmp(file->field[i].name, name);
+  if (!known) return rc_fail(message, RCGNS_USAGE, "%s: the chosen solution has no field %s", file->path, name);
+  for (int64_t z = 0; z < file->num_zones; z++) {
+    rc_box box;
+
+    array[z] = array_of(file, z, name);
+    if (array[z] < 0)
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: field %s is missing there: leave it out (--fields)", file->path,
+                     file->zone[z].name, name);
+    if (!core_of(file, file->zone + z, file->solution[z], array[z], &box))
+      return rc_fail(message, RCGNS_IO, "%s: zone %s: the size of field %s does not match the zone's %lld cells", file->path,
+                     file->zone[z].name, name, (long long)file->zone[z].num_cells);
+  }
+  return RCGNS_OK;
+}
+
+rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values, rcgns_message *message)
+{
+  int64_t     *array  = rc_alloc(file->num_zones, sizeof *array);
+  rcgns_status status = array ? find_field(file, name, array, message) : rc_no_memory(message);
+
+  status = rc_agree(file->comm, status, message);
+  if (status == RCGNS_OK) status = read_arrays(file, array, values, message);
+  free(array);
+  return status;
+}
+
+/* ---- fields of any node ------------------------------------------------------------------------------------------- */
+
+/* The cell array `field` of a node of a zone; -1: none of the zone's size. */
+static int64_t cells_in(const rcgns_file *file, const rc_zone *zone, int64_t node, const char *field)
+{
+  const char *label = rc_node_at(&file->tree, node)->label;
+  int64_t     at    = -1;
+  rc_box      box;
+
+  if ((strcmp(label, "FlowSolution_t") && strcmp(label, "DiscreteData_t")) || !is_usable(&file->tree, node)) return -1;
+  while ((at = next_field(&file->tree, node, at)) >= 0)
+    if (!strcmp(rc_node_at(&file->tree, at)->name, field)) return core_of(file, zone, node, at, &box) ? at : -1;
+  return -1;
+}
+
+/* The array that `name` means in a zone; -1: there is none. */
+static int64_t find_cells(const rcgns_file *file, int64_t z, const char *name)
+{
+  const rc_zone *zone  = file->zone + z;
+  const char    *slash = strchr(name, '/'), *field = slash ? slash + 1 : name;
+  int64_t        array = -1;
+
+  if (!slash && file->solution[z] >= 0) array = cells_in(file, zone, file->solution[z], field);
+  for (int64_t at = -1; array < 0 && (at = rc_tree_find(&file->tree, zone->node, at, NULL, NULL)) >= 0;) {
+    const char *node = rc_node_at(&file->tree, at)->name;
+
+    if (slash && (strncmp(node, name, (size_t)(slash - name)) || node[slash - name])) continue;
+    array = cells_in(file, zone, at, field);
+  }
+  return array;
+}
+
+rcgns_status rcgns_read_cells(rcgns_file *file, const char *name, double *values, rcgns_message *message)
+{
+  int64_t     *array  = rc_alloc(file->num_zones, sizeof *array);
+  rcgns_status status = array ? RCGNS_OK : rc_no_memory(message);
+
+  for (int64_t z = 0; z < file->num_zones && status == RCGNS_OK; z++) {
+    words have = {.used = 0};
+
+    if ((array[z] = find_cells(file, z, name)) >= 0) continue;
+    list_solutions(file, file->zone + z, &have);
+    status = rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no cell-centred field %.100s; its solutions are: %s",
+                     file->path, file->zone[z].name, name, have.text);
+  }
+  status = rc_agree(file->comm, status, message);
+  if (status == RCGNS_OK) status = read_arrays(file, array, values, message);
+  free(array);
+  return status;
 }

@@ -2,7 +2,9 @@
  *
  *   main.c      the job: open, read, build, transfer, verify, write, report
  *   fields.c    which fields take part, and their values
- *   job.c       what these two share
+ *   masks.c     which cells give and which want values
+ *   coverage.c  how much of the cells is covered
+ *   job.c       what these share
  *   options.c   the command line
  *   report.c    text for people, JSON for programs
  *   progress.c  a line now and then while a long job runs

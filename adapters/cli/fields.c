@@ -20,7 +20,8 @@ static cli_exit select_solutions(cli_job *j, cli_failure *why)
                         why));
   j->report.solution[REMAP_SOURCE] = j->solution[REMAP_SOURCE].name;
   j->report.solution[REMAP_TARGET] = options->output_solution ? options->output_solution : j->solution[REMAP_SOURCE].name;
-  CLI_TRY(cli_from_cgns(rcgns_check_solution(j->file[REMAP_TARGET], j->report.solution[REMAP_TARGET], &message), &message, why));
+  CLI_TRY(
+      cli_from_cgns(rcgns_check_solution(j->file[REMAP_TARGET], j->report.solution[REMAP_TARGET], &message), &message, why));
   rcgns_choice_default(&choice);
   choice.name     = j->report.solution[REMAP_TARGET];
   choice.optional = 1;
@@ -68,7 +69,7 @@ static cli_exit match_list(const cli_job *j, const char *list, bool *wanted, cli
   return CLI_DONE;
 }
 
-/* Every field that all zones have. */
+/* Every field that all zones have, but for masks: cells that give have theirs alike, and TARGET has its own. */
 static void match_all(cli_job *j, bool *wanted)
 {
   const rcgns_solution *solution = &j->solution[REMAP_SOURCE];
@@ -78,9 +79,41 @@ static void match_all(cli_job *j, bool *wanted)
     const rcgns_field *field = &solution->field[i];
 
     wanted[i] = field->missing_in < 0;
+    if (wanted[i] && cli_is_mask(&j->options, field->name)) {
+      wanted[i] = false;
+      cli_note(j, "%s: field %s is a mask and is left out: name it by --fields to transfer it", info->path, field->name);
+      continue;
+    }
     if (!wanted[i])
       cli_note(j, "%s: field %s is left out: zone %s lacks it", info->path, field->name, info->zone[field->missing_in].name);
   }
+}
+
+/* What the fields of the solution are, by the table or by --nature; given[i]: by the latter. */
+static cli_exit find_natures(const cli_job *j, remap_nature *nature, bool *given, cli_failure *why)
+{
+  const rcgns_solution *solution = &j->solution[REMAP_SOURCE];
+
+  for (int64_t i = 0; i < solution->num_fields; i++) nature[i] = solution->field[i].nature;
+  for (int k = 0; k < j->options.num_natures; k++)
+    for (const char *from = j->options.nature[k], *to; *from; from = *to ? to + 1 : to) {
+      const char  *equals;
+      char         word[32] = "";
+      bool         any      = false;
+      remap_nature what;
+
+      to     = from + strcspn(from, ",");
+      equals = from + strcspn(from, "=");
+      if (equals < to && (size_t)(to - equals) <= sizeof word) memcpy(word, equals + 1, (size_t)(to - equals - 1));
+      if (!cli_nature_of(word, &what))
+        return cli_fail(why, CLI_USAGE,
+                        "--nature: '%.*s' is not offered: give NAME=conserved, mass-specific, volume-mean or flag",
+                        (int)(to - from < 200 ? to - from : 200), from);
+      for (int64_t i = 0; i < solution->num_fields; i++)
+        if (matches(from, equals, solution->field[i].name)) any = given[i] = true, nature[i] = what;
+      if (!any) return refuse_name(j, from, equals, why);
+    }
+  return CLI_DONE;
 }
 
 static bool has_old_value(const cli_job *j, const char *name)
@@ -92,18 +125,17 @@ static bool has_old_value(const cli_job *j, const char *name)
   return false;
 }
 
-static void describe_field(cli_job *j, const rcgns_field *field)
+static void describe_field(cli_job *j, const rcgns_field *field, remap_nature nature, bool is_given)
 {
   const int           k       = j->num_fields++;
-  const bool          slopes  = j->options.transfer.order > 1 && field->nature != REMAP_FLAG;
+  const bool          slopes  = j->options.transfer.order > 1 && nature != REMAP_FLAG;
   const remap_limiter limiter = j->options.transfer.limiter;
 
-  j->field[k] = (remap_field_desc){.name = field->name, .nature = field->nature, .has_old = has_old_value(j, field->name)};
-  j->row[k]   = (cli_field_row){.name = field->name, .nature = field->nature, .limiter = slopes ? limiter : REMAP_LIMITER_NONE};
-  if (!field->nature_known && !field->is_integer)
-    cli_note(j, "field %s: its name is not known, it is averaged over volume", field->name);
-  if (field->nature == REMAP_MASS_SPECIFIC)
-    cli_note(j, "field %s: a quantity per mass, it is averaged over volume", field->name);
+  j->field[k] = (remap_field_desc){.name = field->name, .nature = nature, .has_old = has_old_value(j, field->name)};
+  j->row[k]   = (cli_field_row){.name = field->name, .nature = nature, .limiter = slopes ? limiter : REMAP_LIMITER_NONE};
+  if (!field->nature_known && !field->is_integer && !is_given)
+    cli_note(j, "field %s: its name is not known, it is averaged over volume: say what it is by --nature", field->name);
+  if (nature == REMAP_MASS_SPECIFIC) cli_note(j, "field %s: a quantity per mass, it is averaged over volume", field->name);
 }
 
 /* Choose the fields and make room for their values. */
@@ -111,23 +143,37 @@ static cli_exit select_fields(cli_job *j, cli_failure *why)
 {
   const rcgns_solution *solution = &j->solution[REMAP_SOURCE];
   const size_t          most     = (size_t)solution->num_fields;
-  bool                 *wanted   = calloc(most + 1, sizeof *wanted);
+  bool                 *wanted = calloc(most + 1, sizeof *wanted), *given = calloc(most + 1, sizeof *given);
+  remap_nature         *nature = calloc(most + 1, sizeof *nature);
   cli_exit              mine;
 
   j->field = calloc(most + 1, sizeof *j->field);
   j->row   = calloc(most + 1, sizeof *j->row);
-  mine     = cli_agree(j, wanted && j->field && j->row ? CLI_DONE : cli_no_memory(why), why);
+  mine     = cli_agree(j, wanted && given && nature && j->field && j->row ? CLI_DONE : cli_no_memory(why), why);
+  if (mine == CLI_DONE) mine = find_natures(j, nature, given, why);
   if (mine == CLI_DONE && j->options.fields)
     mine = match_list(j, j->options.fields, wanted, why);
   else if (mine == CLI_DONE)
     match_all(j, wanted);
   for (size_t i = 0; mine == CLI_DONE && i < most; i++)
-    if (wanted[i]) describe_field(j, &solution->field[i]);
+    if (wanted[i]) describe_field(j, &solution->field[i], nature[i], given[i]);
   free(wanted);
+  free(given);
+  free(nature);
   if (mine == CLI_DONE && j->num_fields == 0)
     return cli_fail(why, CLI_IO, "%s: no field of %s is in every zone: choose another by --solution",
                     j->options.path[REMAP_SOURCE], solution->name);
   return mine;
+}
+
+/* --coverage adds a field of its own. */
+static cli_exit check_coverage_name(const cli_job *j, cli_failure *why)
+{
+  for (int k = 0; j->options.coverage && k < j->num_fields; k++)
+    if (!strcmp(j->field[k].name, CLI_COVERAGE_FIELD))
+      return cli_fail(why, CLI_USAGE, "%s: it has a field %s, which --coverage writes: leave one of them out (--fields)",
+                      j->options.path[REMAP_SOURCE], CLI_COVERAGE_FIELD);
+  return CLI_DONE;
 }
 
 static cli_exit make_room(cli_job *j, cli_failure *why)
@@ -171,6 +217,7 @@ cli_exit cli_fields_read(cli_job *j, cli_failure *why)
   cli_progress_set(j->progress, "reading fields", -1);
   CLI_TRY(select_solutions(j, why));
   CLI_TRY(select_fields(j, why));
+  CLI_TRY(check_coverage_name(j, why));
   CLI_TRY(make_room(j, why));
   for (int k = 0; k < j->num_fields; k++) {
     remap_field_desc *field = &j->field[k];

@@ -3,6 +3,7 @@
 
 #include <stdarg.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* ---- ranks together ----------------------------------------------------------------------------------------------- */
 
@@ -30,6 +31,24 @@ cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_fa
                                   [RCGNS_MEMORY]   = CLI_INTERNAL};
 
   return status == RCGNS_OK ? CLI_DONE : cli_fail(why, code[status], "%s", message->text);
+}
+
+cli_exit cli_from_remap(const cli_job *j, remap_status status, cli_failure *why)
+{
+  const char *text = remap_message(j->ctx), *const *path = j->options.path;
+  cli_exit    code = CLI_INTERNAL;
+
+  switch (status) {
+    case REMAP_OK: return CLI_DONE;
+    case REMAP_COVERAGE: code = CLI_COVERAGE; break;
+    case REMAP_BAD_VALUE: code = CLI_IO; break;
+    case REMAP_BAD_MESH:
+    case REMAP_ZONE_OVERLAP: code = CLI_GEOMETRY; break;
+    default: break;
+  }
+  if (!*text) text = remap_status_text(status);
+  if (strstr(text, path[REMAP_SOURCE]) || strstr(text, path[REMAP_TARGET])) return cli_fail(why, code, "%s", text);
+  return cli_fail(why, code, "%s onto %s: %s", path[REMAP_SOURCE], path[REMAP_TARGET], text);
 }
 
 /* ---- remarks ------------------------------------------------------------------------------------------------------ */

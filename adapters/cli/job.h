@@ -11,6 +11,9 @@
 #include <mpi.h>
 #include <remap/remap.h>
 
+/** The field that --coverage and --source-coverage write. */
+#define CLI_COVERAGE_FIELD "Coverage"
+
 /** Everything a step may need. Files and solutions of [remap_side]; the solution of the target holds the old values. */
 typedef struct cli_job {
   MPI_Comm       comm;
@@ -23,9 +26,10 @@ typedef struct cli_job {
   remap_context *ctx;
 
   int               num_fields;
-  remap_field_desc *field;  /**< [num_fields] names, natures and where the values are */
-  cli_field_row    *row;    /**< [num_fields] the same fields in the report */
-  double           *values; /**< behind every in and out of field */
+  remap_field_desc *field;   /**< [num_fields] names, natures and where the values are */
+  cli_field_row    *row;     /**< [num_fields] the same fields in the report */
+  double           *values;  /**< behind every in and out of field */
+  uint8_t          *mask[2]; /**< [remap_side][cells of this rank] SOURCE: which give, TARGET: which want; NULL: all */
 
   int             num_notes;
   char          **note;        /**< [num_notes] remarks for the report */
@@ -52,5 +56,30 @@ const rcgns_zone_info *cli_zone_of(const rcgns_info *info, int64_t cell);
  *  solution, field, row and values. Collective. Errors: USAGE (what was named is not there), IO (unreadable, or not finite),
  *  INTERNAL. */
 cli_exit cli_fields_read(cli_job *j, cli_failure *why);
+
+/** Is a field of that name the mask of one side? Not collective. */
+bool cli_is_mask(const cli_options *options, const char *field);
+
+/** Read the masks that were asked for: fills mask and the report's words about them. Collective. Errors: USAGE (no such field,
+ *  no known codes, no cell takes part), IO, INTERNAL. */
+cli_exit cli_masks_read(cli_job *j, cli_failure *why);
+
+/** Give the library the masks, after remap_build. Collective. Errors: GEOMETRY (cells that give overlap), INTERNAL. */
+cli_exit cli_masks_apply(cli_job *j, cli_failure *why);
+
+/** Give the cells of TARGET that want nothing and have no old values the state of the first cell that wants: holes must hold
+ *  something that a solver can read. With --on-uncovered fill=VALUE they get that. Collective. */
+void cli_masks_fill(cli_job *j);
+
+/** How much of the cells is covered, for the report. Collective. Errors: INTERNAL. */
+cli_exit cli_coverage_find(cli_job *j, cli_failure *why);
+
+/** The fraction of each cell of one side on this rank that the other side covers; *fraction is the caller's (free). Collective.
+ *  Errors: INTERNAL. */
+cli_exit cli_coverage_fractions(cli_job *j, remap_side side, double **fraction, cli_failure *why);
+
+/** A status of the library as an exit status; its message becomes ours, with the files' names where it has none. Not
+ *  collective. */
+cli_exit cli_from_remap(const cli_job *j, remap_status status, cli_failure *why);
 
 #endif

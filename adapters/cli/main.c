@@ -36,25 +36,6 @@ static int64_t peak_rss(const cli_job *j)
   return bytes;
 }
 
-/* A status of the library as an exit status; its message becomes ours, with the files' names where it has none. */
-static cli_exit from_remap(const cli_job *j, remap_status status, cli_failure *why)
-{
-  const char *text = remap_message(j->ctx), *const *path = j->options.path;
-  cli_exit    code = CLI_INTERNAL;
-
-  switch (status) {
-    case REMAP_OK: return CLI_DONE;
-    case REMAP_COVERAGE: code = CLI_COVERAGE; break;
-    case REMAP_BAD_VALUE: code = CLI_IO; break;
-    case REMAP_BAD_MESH:
-    case REMAP_ZONE_OVERLAP: code = CLI_GEOMETRY; break;
-    default: break;
-  }
-  if (!*text) text = remap_status_text(status);
-  if (strstr(text, path[REMAP_SOURCE]) || strstr(text, path[REMAP_TARGET])) return cli_fail(why, code, "%s", text);
-  return cli_fail(why, code, "%s onto %s: %s", path[REMAP_SOURCE], path[REMAP_TARGET], text);
-}
-
 /* What the files and the options leave to remark. */
 static void collect_notes(cli_job *j)
 {
@@ -106,17 +87,30 @@ static cli_exit open_file(cli_job *j, remap_side side, cli_failure *why)
   return CLI_DONE;
 }
 
-/* Can OUTPUT and REPORT be written, and are they no input? */
+/* A CGNS file to be written must be no input. Collective. */
+static cli_exit check_new_file(cli_job *j, const char *path, cli_failure *why)
+{
+  rcgns_message message;
+
+  for (int side = 0; side < 2; side++) CLI_TRY(cli_from_cgns(rcgns_check_output(j->file[side], path, &message), &message, why));
+  return CLI_DONE;
+}
+
+/* Can OUTPUT, REPORT and the like be written, and are they no input? */
 static cli_exit check_outputs(cli_job *j, cli_failure *why)
 {
-  const cli_options *options   = &j->options;
-  const char *const  others[3] = {options->path[REMAP_SOURCE], options->path[REMAP_TARGET], options->output};
-  rcgns_message      message;
-  cli_exit           mine = CLI_DONE;
+  const cli_options *options    = &j->options;
+  const char        *psi        = options->source_coverage;
+  const char *const  others[4]  = {options->path[REMAP_SOURCE], options->path[REMAP_TARGET], options->output, psi};
+  const int          num_others = psi ? 4 : 3;
+  cli_exit           mine       = CLI_DONE;
 
-  for (int side = 0; side < 2; side++)
-    CLI_TRY(cli_from_cgns(rcgns_check_output(j->file[side], options->output, &message), &message, why));
-  if (options->report && j->rank == 0) mine = cli_report_open(options->report, 3, others, &j->report_file, why);
+  CLI_TRY(check_new_file(j, options->output, why));
+  if (psi) CLI_TRY(check_new_file(j, psi, why));
+  if (psi && j->rank == 0 && cli_is_same_file(psi, options->output))
+    mine = cli_fail(why, CLI_USAGE, "%s: it is used already: give --source-coverage another file", psi);
+  if (mine == CLI_DONE && options->report && j->rank == 0)
+    mine = cli_report_open(options->report, num_others, others, &j->report_file, why);
   return cli_agree(j, mine, why);
 }
 
@@ -155,7 +149,7 @@ static cli_exit build(cli_job *j, cli_failure *why)
   remap_options_default(&options);
   options.faces                 = j->options.faces;
   options.max_order             = j->options.transfer.order;
-  options.zone_overlap_is_error = 1;
+  options.zone_overlap_is_error = !j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET]; /* which tell zones apart */
   options.log                   = j->options.verbose && !j->options.quiet ? print_log : NULL;
   options.progress              = hear_progress;
   options.user                  = j;
@@ -163,8 +157,10 @@ static cli_exit build(cli_job *j, cli_failure *why)
   if (status != REMAP_OK)
     return cli_fail(why, CLI_INTERNAL, "%s: %s", j->options.path[REMAP_SOURCE], remap_status_text(status));
   for (int side = 0; side < 2; side++) remap_set_mesh(j->ctx, (remap_side)side, rcgns_mesh(j->file[side]));
-  CLI_TRY(from_remap(j, remap_build(j->ctx), why));
-  return from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why);
+  CLI_TRY(cli_from_remap(j, remap_build(j->ctx), why));
+  CLI_TRY(cli_from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why));
+  CLI_TRY(cli_masks_apply(j, why));
+  return cli_coverage_find(j, why);
 }
 
 static cli_exit transfer(cli_job *j, cli_failure *why)
@@ -175,8 +171,9 @@ static cli_exit transfer(cli_job *j, cli_failure *why)
 
   cli_progress_set(j->progress, "transfer", -1);
   if (mine == CLI_DONE)
-    mine = from_remap(j, remap_field(j->ctx, REMAP_FORWARD, &j->options.transfer, j->num_fields, j->field, what), why);
+    mine = cli_from_remap(j, remap_field(j->ctx, REMAP_FORWARD, &j->options.transfer, j->num_fields, j->field, what), why);
   for (int k = 0; mine == CLI_DONE && k < j->num_fields; k++) j->row[k].what = what[k];
+  if (mine == CLI_DONE) cli_masks_fill(j);
   free(what);
   CLI_TRY(mine);
   j->report.num_fields       = j->num_fields;
@@ -215,24 +212,57 @@ static cli_exit verify(const cli_job *j, cli_failure *why)
 
 /* ---- the end ------------------------------------------------------------------------------------------------------ */
 
-static cli_exit write_output(cli_job *j, cli_failure *why)
+/* The fields and, with --coverage, phi. Collective. */
+static cli_exit write_target(cli_job *j, cli_failure *why)
 {
-  const cli_options *options = &j->options;
-  const double       begin   = MPI_Wtime();
-  rcgns_new_field   *fields  = calloc((size_t)j->num_fields, sizeof *fields);
-  cli_exit           mine    = cli_agree(j, fields ? CLI_DONE : cli_no_memory(why), why);
+  const cli_options *options  = &j->options;
+  rcgns_new_field   *fields   = calloc((size_t)j->num_fields + 1, sizeof *fields);
+  double            *fraction = NULL;
+  cli_exit           mine     = cli_agree(j, fields ? CLI_DONE : cli_no_memory(why), why);
   rcgns_message      message;
 
-  cli_progress_set(j->progress, "writing", -1);
   for (int k = 0; mine == CLI_DONE && k < j->num_fields; k++)
     fields[k] = (rcgns_new_field){.name = j->field[k].name, .values = j->field[k].out};
-  if (mine == CLI_DONE)
-    mine = cli_from_cgns(
-        rcgns_write(j->file[REMAP_TARGET], options->output, j->report.solution[REMAP_TARGET], j->num_fields, fields, &message),
-        &message, why);
+  if (mine == CLI_DONE && options->coverage) mine = cli_coverage_fractions(j, REMAP_TARGET, &fraction, why);
+  if (mine == CLI_DONE) {
+    const char  *solution = j->report.solution[REMAP_TARGET];
+    rcgns_status status;
+
+    fields[j->num_fields] = (rcgns_new_field){.name = CLI_COVERAGE_FIELD, .values = fraction};
+    status = rcgns_write(j->file[REMAP_TARGET], options->output, solution, j->num_fields + options->coverage, fields, &message);
+    mine   = cli_from_cgns(status, &message, why);
+  }
+  free(fraction);
   free(fields);
-  CLI_TRY(mine);
-  j->report.output        = options->output;
+  if (mine == CLI_DONE) j->report.output = options->output;
+  return mine;
+}
+
+/* SOURCE with psi. Collective. */
+static cli_exit write_source(cli_job *j, cli_failure *why)
+{
+  const char     *path = j->options.source_coverage;
+  double         *fraction;
+  rcgns_new_field psi = {.name = CLI_COVERAGE_FIELD};
+  rcgns_message   message;
+  cli_exit        mine;
+
+  CLI_TRY(cli_coverage_fractions(j, REMAP_SOURCE, &fraction, why));
+  psi.values = fraction;
+  mine = cli_from_cgns(rcgns_write(j->file[REMAP_SOURCE], path, j->report.solution[REMAP_SOURCE], 1, &psi, &message), &message,
+                       why);
+  free(fraction);
+  if (mine == CLI_DONE) j->report.source_coverage = path;
+  return mine;
+}
+
+static cli_exit write_output(cli_job *j, cli_failure *why)
+{
+  const double begin = MPI_Wtime();
+
+  cli_progress_set(j->progress, "writing", -1);
+  if (j->options.source_coverage) CLI_TRY(write_source(j, why));
+  CLI_TRY(write_target(j, why));
   j->report.seconds_write = slowest(j, begin);
   return CLI_DONE;
 }
@@ -261,11 +291,13 @@ static cli_exit run(cli_job *j, cli_failure *why)
 
   CLI_TRY(open_files(j, why));
   CLI_TRY(cli_fields_read(j, why));
+  CLI_TRY(cli_masks_read(j, why));
   j->report.seconds_read = slowest(j, j->begin);
   MPI_Comm_size(j->comm, &j->report.stats.ranks);
   if (speaks) cli_report_meshes(stdout, &j->report, j->options.verbose);
   CLI_TRY(build(j, why));
   if (speaks) cli_report_overlap(stdout, &j->report);
+  if (speaks) cli_report_cover(stdout, &j->report);
   CLI_TRY(transfer(j, why));
   if (speaks) cli_report_fields(stdout, &j->report);
   verified = verify(j, why);
@@ -287,6 +319,7 @@ static void end(cli_job *j)
   for (int side = 0; side < 2; side++) rcgns_close(&j->file[side]);
   for (int i = 0; i < j->num_notes; i++) free(j->note[i]);
   free(j->note);
+  for (int side = 0; side < 2; side++) free(j->mask[side]);
   free(j->values);
   free(j->row);
   free(j->field);

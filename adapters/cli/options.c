@@ -5,6 +5,8 @@
 #include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,47 +22,64 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
 
 /* ---- the table ---------------------------------------------------------------------------------------------------- */
 
-/* Options: letter or 0, name, what its argument is called or NULL, what it does. A second line of help follows after \n. */
-#define OPTION_LIST(X)                                                                                                 \
-  X(FIELDS, 'f', "fields", "LIST", "names or globs, comma separated; default every cell-centred field of SOURCE")      \
-  X(ORDER, 0, "order", "1|2|3", "accuracy of the transfer; default 2")                                                 \
-  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto",                                                           \
-    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                       \
-  X(FACES, 0, "faces", "centre|diagonal", "how faces become triangles; default centre")                                \
-  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error",                                                  \
-    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                            \
-  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error",                                                     \
-    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                        \
-  X(SOLUTION, 0, "solution", "NAME", "the FlowSolution_t of SOURCE to take; default the only one there is")            \
-  X(STEP, 0, "step", "N|last", "or the one of a time step, counted from 1")                                            \
-  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", "the FlowSolution_t to write; default the source's name")           \
-  X(SOURCE_BASE, 0, "source-base", "NAME", "read this base of SOURCE only")                                            \
-  X(TARGET_BASE, 0, "target-base", "NAME", "read this base of TARGET only")                                            \
-  X(SCALE, 0, "scale", "FACTOR", "multiply SOURCE's coordinates first")                                                \
-  X(TRANSFORM, 0, "transform", "FILE", "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")               \
-  X(REPORT, 0, "report", "FILE", "write the report as JSON too")                                                       \
-  X(OUTPUT, 'o', "output", "OUTPUT", "the file to write: TARGET and the fields, as HDF5")                              \
-  X(QUIET, 'q', "quiet", NULL, "print neither report nor progress")                                                    \
-  X(VERBOSE, 'v', "verbose", NULL, "print zones and what the library says too")                                        \
-  X(VERSION, 0, "version", NULL, "print the version")                                                                  \
-  X(HELP, 'h', "help", NULL, "print this text")
+/* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or OTHER, what it does. A second
+ * line of help follows after \n. */
+#define AT(member) offsetof(cli_options, member)
+#define OPTION_LIST(X)                                                                                                       \
+  X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                     \
+  X(NATURE, 0, "nature", "NAME=NATURE,...", OTHER,                                                                           \
+    "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")  \
+  X(ORDER, 0, "order", "1|2|3", OTHER, "accuracy of the transfer; default 2")                                                \
+  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", OTHER,                                                          \
+    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                            \
+  X(FACES, 0, "faces", "centre|diagonal", OTHER, "how faces become triangles; default centre")                               \
+  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error", OTHER,                                                 \
+    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                                  \
+  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error", OTHER,                                                    \
+    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                              \
+  X(COVERAGE, 0, "coverage", NULL, AT(coverage), "write how much of each cell SOURCE covers too, as field Coverage")         \
+  X(SOURCE_COVERAGE, 0, "source-coverage", "FILE", AT(source_coverage),                                                      \
+    "write SOURCE with how much of each of its cells TARGET covers")                                                         \
+  X(SOURCE_MASK, 0, "source-mask", "FIELD[=CODES]", AT(mask[REMAP_SOURCE]),                                                  \
+    "take values only where this field of SOURCE says 'computed':\ncellN 1, Iblank above 0, others not 0, or CODES such as " \
+    "1+2")                                                                                                                   \
+  X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                  \
+    "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                         \
+  X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")    \
+  X(STEP, 0, "step", "N|last", OTHER, "or the one of a time step, counted from 1")                                           \
+  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                      \
+    "the FlowSolution_t to write; default the source's name")                                                                \
+  X(SOURCE_BASE, 0, "source-base", "NAME", AT(base[REMAP_SOURCE]), "read this base of SOURCE only")                          \
+  X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                          \
+  X(SCALE, 0, "scale", "FACTOR", OTHER, "multiply SOURCE's coordinates first")                                               \
+  X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")      \
+  X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                 \
+  X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                        \
+  X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                               \
+  X(VERBOSE, 'v', "verbose", NULL, AT(verbose), "print zones and what the library says too")                                 \
+  X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                           \
+  X(HELP, 'h', "help", NULL, AT(help), "print this text")
 
 enum option_key {
   FIRST_KEY = 256, /* above every letter, so that getopt's own answers cannot be mistaken */
-#define X(key, letter, name, argument, text) KEY_##key,
+#define X(key, letter, name, argument, at, text) KEY_##key,
   OPTION_LIST(X)
 #undef X
       END_KEY
 };
 
+#define OTHER SIZE_MAX
+
 typedef struct option_row {
   int         key;
   char        letter;
-  const char *name, *argument, *text;
+  const char *name, *argument;
+  size_t      at; /* of a const char * if there is an argument, else of a bool; OTHER: parse_value knows */
+  const char *text;
 } option_row;
 
 static const option_row rows[] = {
-#define X(key, letter, name, argument, text) {KEY_##key, letter, name, argument, text},
+#define X(key, letter, name, argument, at, text) {KEY_##key, letter, name, argument, at, text},
     OPTION_LIST(X)
 #undef X
 };
@@ -78,6 +97,11 @@ static const word limiter_words[]   = {{"none", REMAP_LIMITER_NONE},
                                        {"caas", REMAP_LIMITER_CAAS},
                                        {"auto", REMAP_LIMITER_AUTO},
                                        {NULL, 0}};
+static const word nature_words[]    = {{"conserved", REMAP_CONSERVED},
+                                       {"mass-specific", REMAP_MASS_SPECIFIC},
+                                       {"volume-mean", REMAP_VOLUME_MEAN},
+                                       {"flag", REMAP_FLAG},
+                                       {NULL, 0}};
 static const word faces_words[]     = {{"centre", REMAP_FACES_CENTRE}, {"diagonal", REMAP_FACES_DIAGONAL}, {NULL, 0}};
 static const word uncovered_words[] = {{"keep", REMAP_UNCOVERED_KEEP},
                                        {"nearest", REMAP_UNCOVERED_NEAREST},
@@ -89,11 +113,25 @@ static const word partial_words[]   = {{"blend", REMAP_PARTIAL_BLEND},
                                        {"error", REMAP_PARTIAL_ERROR},
                                        {NULL, 0}};
 
-const char *cli_limiter_word(remap_limiter limiter)
+static const char *word_of(const word *words, int value)
 {
-  for (const word *w = limiter_words; w->text; w++)
-    if (w->value == (int)limiter) return w->text;
+  for (const word *w = words; w->text; w++)
+    if (w->value == value) return w->text;
   return "unknown";
+}
+
+const char *cli_limiter_word(remap_limiter limiter) { return word_of(limiter_words, (int)limiter); }
+
+const char *cli_nature_word(remap_nature nature) { return word_of(nature_words, (int)nature); }
+
+bool cli_nature_of(const char *text, remap_nature *nature)
+{
+  for (const word *w = nature_words; w->text; w++)
+    if (!strcmp(w->text, text)) {
+      *nature = (remap_nature)w->value;
+      return true;
+    }
+  return false;
 }
 
 /* ---- help --------------------------------------------------------------------------------------------------------- */
@@ -174,13 +212,17 @@ static cli_exit parse_step(const char *argument, int64_t *step, cli_failure *why
   return CLI_DONE;
 }
 
-static cli_exit parse_one(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
+/* The options that are neither a mere text nor a flag. */
+static cli_exit parse_value(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
 {
   int value = 0;
 
-  if (argument && !*argument) return cli_fail(why, CLI_USAGE, "--%s: its argument is empty: give %s", row->name, row->argument);
   switch (row->key) {
-    case KEY_FIELDS: out->fields = argument; break;
+    case KEY_NATURE:
+      if (out->num_natures == CLI_MAX_NATURES)
+        return cli_fail(why, CLI_USAGE, "--nature: it is given more than %d times: give lists", CLI_MAX_NATURES);
+      out->nature[out->num_natures++] = argument;
+      break;
     case KEY_ORDER:
       CLI_TRY(pick(order_words, row, argument, &value, why));
       out->transfer.order = value;
@@ -198,24 +240,26 @@ static cli_exit parse_one(const option_row *row, const char *argument, cli_optio
       CLI_TRY(pick(partial_words, row, argument, &value, why));
       out->transfer.on_partial = (remap_on_partial)value;
       break;
-    case KEY_SOLUTION: out->solution = argument; break;
     case KEY_STEP: return parse_step(argument, &out->step, why);
-    case KEY_OUTPUT_SOLUTION: out->output_solution = argument; break;
-    case KEY_SOURCE_BASE: out->base[REMAP_SOURCE] = argument; break;
-    case KEY_TARGET_BASE: out->base[REMAP_TARGET] = argument; break;
     case KEY_SCALE:
       if (!number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
         return cli_fail(why, CLI_USAGE, "--scale: '%.200s' is no factor: give a positive number", argument);
       break;
-    case KEY_TRANSFORM: out->transform = argument; break;
-    case KEY_REPORT: out->report = argument; break;
-    case KEY_OUTPUT: out->output = argument; break;
-    case KEY_QUIET: out->quiet = true; break;
-    case KEY_VERBOSE: out->verbose = true; break;
-    case KEY_VERSION: out->version = true; break;
-    case KEY_HELP: out->help = true; break;
     default: break;
   }
+  return CLI_DONE;
+}
+
+static cli_exit parse_one(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
+{
+  char *place = (char *)out + (row->at == OTHER ? 0 : row->at);
+
+  if (argument && !*argument) return cli_fail(why, CLI_USAGE, "--%s: its argument is empty: give %s", row->name, row->argument);
+  if (row->at == OTHER) return parse_value(row, argument, out, why);
+  if (row->argument)
+    memcpy(place, &argument, sizeof argument);
+  else
+    *(bool *)place = true;
   return CLI_DONE;
 }
 

@@ -9,16 +9,23 @@
 #include <stdint.h>
 #include <stdio.h>
 
+enum { CLI_MAX_NATURES = 64 };
+
 /** What was asked for. Texts point into argv; NULL where an option was not given. */
 typedef struct cli_options {
   const char    *path[2]; /**< [remap_side] */
   const char    *output;
   const char    *report;
-  const char    *fields;  /**< names and globs, comma separated */
-  const char    *base[2]; /**< [remap_side] */
+  const char    *fields; /**< names and globs, comma separated */
+  int            num_natures;
+  const char    *nature[CLI_MAX_NATURES]; /**< [num_natures] lists of NAME=NATURE, comma separated */
+  const char    *mask[2];                 /**< [remap_side] FIELD or FIELD=CODES */
+  const char    *base[2];                 /**< [remap_side] */
   const char    *solution, *output_solution;
-  const char    *transform; /**< path of a 3x4 matrix */
-  int64_t        step;      /**< 1 ..; -1 the last; 0 not given */
+  const char    *transform;       /**< path of a 3x4 matrix */
+  const char    *source_coverage; /**< the file to write with psi */
+  bool           coverage;        /**< write phi into OUTPUT */
+  int64_t        step;            /**< 1 ..; -1 the last; 0 not given */
   double         scale;
   remap_faces    faces;
   remap_transfer transfer;
@@ -32,7 +39,11 @@ cli_exit cli_options_parse(int argc, char **argv, cli_options *out, cli_failure 
 /** What --help prints. Not collective. */
 void cli_options_help(FILE *out);
 
-/** The word of the command line for a limiter. Static text. Not collective. */
+/** The words of the command line for a limiter and for a nature. Static text. Not collective. */
 const char *cli_limiter_word(remap_limiter limiter);
+const char *cli_nature_word(remap_nature nature);
+
+/** The nature that a word of the command line names; false if it names none. Not collective. */
+bool cli_nature_of(const char *word, remap_nature *nature);
 
 #endif

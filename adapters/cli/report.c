@@ -12,17 +12,6 @@
 
 static const char *const side_word[2] = {"source", "target"};
 
-static const char *nature_word(remap_nature nature)
-{
-  switch (nature) {
-    case REMAP_CONSERVED: return "conserved";
-    case REMAP_MASS_SPECIFIC: return "mass-specific";
-    case REMAP_VOLUME_MEAN: return "volume-mean";
-    case REMAP_FLAG: return "flag";
-  }
-  return "unknown";
-}
-
 /* "Base/Zone: cell 7 (counted from 1)" for a global cell; text has room for size bytes. */
 static const char *cell_words(const rcgns_info *info, int64_t cell, char *text, size_t size)
 {
@@ -75,6 +64,36 @@ void cli_report_overlap(FILE *out, const cli_report *report)
   fflush(out);
 }
 
+/* A cell that is not wholly covered, for people. */
+static void print_bare(FILE *out, const rcgns_info *info, const char *how, const cli_bare_cell *bare)
+{
+  char cell[256];
+
+  fprintf(out, "        %s %s, %.4g covered of %.4g, at %.6g %.6g %.6g\n", how, cell_words(info, bare->cell, cell, sizeof cell),
+          bare->fraction * bare->volume, bare->volume, bare->centre[0], bare->centre[1], bare->centre[2]);
+}
+
+void cli_report_cover(FILE *out, const cli_report *report)
+{
+  for (int side = 0; side < 2; side++) {
+    const cli_cover_row *cover = &report->cover[side];
+
+    if (report->mask[side])
+      fprintf(out, "%s: mask %s: %lld cell%s of volume %.6g take no part\n", side_word[side], report->mask[side],
+              (long long)cover->cells[REMAP_UNWANTED], plural(cover->cells[REMAP_UNWANTED]), cover->volume[REMAP_UNWANTED]);
+    if (side == REMAP_SOURCE) continue; /* what TARGET leaves out of SOURCE lacks nobody */
+    if (cover->num_partial)
+      fprintf(out, "%s: %lld cell%s of volume %.6g covered in part\n", side_word[side], (long long)cover->cells[REMAP_PARTIAL],
+              plural(cover->cells[REMAP_PARTIAL]), cover->volume[REMAP_PARTIAL]);
+    for (int i = 0; i < cover->num_partial; i++) print_bare(out, report->info[side], "least", &cover->partial[i]);
+    if (cover->num_uncovered)
+      fprintf(out, "%s: %lld cell%s of volume %.6g not covered\n", side_word[side], (long long)cover->cells[REMAP_UNCOVERED],
+              plural(cover->cells[REMAP_UNCOVERED]), cover->volume[REMAP_UNCOVERED]);
+    for (int i = 0; i < cover->num_uncovered; i++) print_bare(out, report->info[side], "largest", &cover->uncovered[i]);
+  }
+  fflush(out);
+}
+
 void cli_report_fields(FILE *out, const cli_report *report)
 {
   int width = 24;
@@ -87,9 +106,9 @@ void cli_report_fields(FILE *out, const cli_report *report)
     const cli_field_row      *row  = &report->field[i];
     const remap_field_report *what = &row->what;
 
-    fprintf(out, "%-*s %-13s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name, nature_word(row->nature),
-            what->source_integral, what->target_integral, what->conservation_error, what->source_min, what->source_max,
-            what->target_min, what->target_max);
+    fprintf(out, "%-*s %-13s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name,
+            cli_nature_word(row->nature), what->source_integral, what->target_integral, what->conservation_error,
+            what->source_min, what->source_max, what->target_min, what->target_max);
   }
   fflush(out);
 }
@@ -104,6 +123,7 @@ void cli_report_end(FILE *out, const cli_report *report)
           report->seconds_read, stats->seconds_partition, stats->seconds_overlay, report->seconds_transfer,
           report->seconds_write, report->seconds_total);
   fprintf(out, "memory  %.1f MB on the rank that needs most\n", 1e-6 * (double)report->peak_rss);
+  if (report->source_coverage) fprintf(out, "output  %s, coverage of SOURCE\n", report->source_coverage);
   if (report->output) fprintf(out, "output  %s, fields in %s\n", report->output, report->solution[REMAP_TARGET]);
   fflush(out);
 }
@@ -172,16 +192,47 @@ static json_t *overlap_json(const remap_stats *stats)
   return overlap;
 }
 
+/* A list of cells that are not wholly covered. */
+static json_t *bare_json(const rcgns_info *info, int num, const cli_bare_cell *bare)
+{
+  json_t *list = json_array();
+  char    cell[256];
+
+  for (int i = 0; i < num; i++)
+    json_array_append_new(list, json_pack("{s:o, s:o, s:o, s:[o, o, o]}", "cell",
+                                          words(cell_words(info, bare[i].cell, cell, sizeof cell)), "coverage",
+                                          real(bare[i].fraction), "volume", real(bare[i].volume), "centre",
+                                          real(bare[i].centre[0]), real(bare[i].centre[1]), real(bare[i].centre[2])));
+  return list;
+}
+
+static json_t *cover_json(const cli_report *report, remap_side side)
+{
+  static const char *const word[4] = {"uncovered", "partial", "covered", "masked"};
+  const cli_cover_row     *cover   = &report->cover[side];
+  json_t                  *object  = json_object();
+
+  json_object_set_new(object, "mask", words(report->mask[side]));
+  for (int i = 3; i >= 0; i--)
+    json_object_set_new(object, word[i],
+                        json_pack("{s:I, s:o}", "cells", (json_int_t)cover->cells[i], "volume", real(cover->volume[i])));
+  json_object_set_new(object, "least", real(cover->least));
+  json_object_set_new(object, "least_partial", bare_json(report->info[side], cover->num_partial, cover->partial));
+  json_object_set_new(object, "largest_uncovered", bare_json(report->info[side], cover->num_uncovered, cover->uncovered));
+  return object;
+}
+
 static json_t *field_json(const cli_field_row *row)
 {
   const remap_field_report *what = &row->what;
 
   return json_pack("{s:o, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:I}", "name", words(row->name), "nature",
-                   nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter), "source_integral",
-                   real(what->source_integral), "target_integral", real(what->target_integral), "conservation_error",
-                   real(what->conservation_error), "source_min", real(what->source_min), "source_max", real(what->source_max),
-                   "target_min", real(what->target_min), "target_max", real(what->target_max), "limited_cells",
-                   (json_int_t)what->limited_cells, "order_reduced_cells", (json_int_t)what->order_reduced_cells);
+                   cli_nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter),
+                   "source_integral", real(what->source_integral), "target_integral", real(what->target_integral),
+                   "conservation_error", real(what->conservation_error), "source_min", real(what->source_min), "source_max",
+                   real(what->source_max), "target_min", real(what->target_min), "target_max", real(what->target_max),
+                   "limited_cells", (json_int_t)what->limited_cells, "order_reduced_cells",
+                   (json_int_t)what->order_reduced_cells);
 }
 
 /* The whole report; NULL if memory is out. The caller ends it with json_decref. */
@@ -192,12 +243,14 @@ static json_t *report_json(const cli_report *report)
 
   for (int i = 0; i < report->num_fields; i++) json_array_append_new(fields, field_json(&report->field[i]));
   for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, words(report->note[i]));
-  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version", remap_version(),
-                   "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target", side_json(report, REMAP_TARGET),
-                   "overlap", overlap_json(stats), "fields", fields, "time", "read", real(report->seconds_read), "partition",
-                   real(stats->seconds_partition), "overlay", real(stats->seconds_overlay), "transfer",
-                   real(report->seconds_transfer), "write", real(report->seconds_write), "total", real(report->seconds_total),
-                   "memory", "peak_rss_bytes_max", (json_int_t)report->peak_rss, "notes", notes);
+  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:{s:o, s:o}, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version",
+                   remap_version(), "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target",
+                   side_json(report, REMAP_TARGET), "overlap", overlap_json(stats), "coverage", "source",
+                   cover_json(report, REMAP_SOURCE), "target", cover_json(report, REMAP_TARGET), "fields", fields, "time",
+                   "read", real(report->seconds_read), "partition", real(stats->seconds_partition), "overlay",
+                   real(stats->seconds_overlay), "transfer", real(report->seconds_transfer), "write",
+                   real(report->seconds_write), "total", real(report->seconds_total), "memory", "peak_rss_bytes_max",
+                   (json_int_t)report->peak_rss, "notes", notes);
 }
 
 /* ---- the file ----------------------------------------------------------------------------------------------------- */
@@ -221,8 +274,7 @@ static const char *last_part(const char *path)
   return slash ? slash + 1 : path;
 }
 
-/* Do two paths name one file, which need not exist yet? */
-static bool same_file(const char *a, const char *b)
+bool cli_is_same_file(const char *a, const char *b)
 {
   struct stat sa, sb;
 
@@ -239,7 +291,8 @@ cli_exit cli_report_open(const char *path, int num_others, const char *const *ot
 
   *out = (cli_report_file){.path = path};
   for (int i = 0; i < num_others; i++)
-    if (same_file(path, others[i])) return cli_fail(why, CLI_USAGE, "%s: it is used already: give --report another file", path);
+    if (cli_is_same_file(path, others[i]))
+      return cli_fail(why, CLI_USAGE, "%s: it is used already: give --report another file", path);
   if (!in_place && !(out->part = malloc(size))) return no_memory(why);
   if (out->part) snprintf(out->part, size, "%s.part", path);
   out->stream = fopen(in_place ? path : out->part, "w");

@@ -6,6 +6,7 @@
 
 #include <cgns.h>
 #include <remap/remap.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 
@@ -21,12 +22,34 @@ typedef struct cli_field_row {
   remap_field_report what;
 } cli_field_row;
 
+enum { CLI_WORST = 5 };
+
+/** A cell that is not wholly covered. */
+typedef struct cli_bare_cell {
+  int64_t cell;     /**< global */
+  double  fraction; /**< of its volume that is covered */
+  double  volume;
+  double  centre[3]; /**< its centroid */
+} cli_bare_cell;
+
+/** How much of one mesh the other covers, masks counted in. */
+typedef struct cli_cover_row {
+  int64_t       cells[4];  /**< [remap_cover] */
+  double        volume[4]; /**< [remap_cover] of those cells */
+  double        least;     /**< fraction of the partial cell that is covered least, 1 if there is none */
+  int           num_partial, num_uncovered;
+  cli_bare_cell partial[CLI_WORST];   /**< [num_partial] those that are covered least */
+  cli_bare_cell uncovered[CLI_WORST]; /**< [num_uncovered] the largest ones */
+} cli_cover_row;
+
 /** Everything there is to tell; texts are borrowed. */
 typedef struct cli_report {
   const rcgns_info    *info[2]; /**< [remap_side] */
   remap_stats          stats;
-  const char          *solution[2]; /**< [remap_side] names of the FlowSolution_t read and written */
-  const char          *output;
+  const char          *solution[2];              /**< [remap_side] names of the FlowSolution_t read and written */
+  const char          *output, *source_coverage; /**< files that were written, NULL if not */
+  const char          *mask[2];                  /**< [remap_side] as asked for, NULL: none */
+  cli_cover_row        cover[2];                 /**< [remap_side] */
   int                  num_fields;
   const cli_field_row *field; /**< [num_fields] */
   int                  num_notes;
@@ -39,6 +62,8 @@ typedef struct cli_report {
 void cli_report_meshes(FILE *out, const cli_report *report, int verbose);
 /** The overlap: pairs, volumes, coverage, closure. */
 void cli_report_overlap(FILE *out, const cli_report *report);
+/** Which cells are covered in part or not at all, if there are such, and what the masks say. */
+void cli_report_cover(FILE *out, const cli_report *report);
 /** A line per field: what was conserved. */
 void cli_report_fields(FILE *out, const cli_report *report);
 /** Remarks, time per phase, memory, the file written; output is not mentioned if it is NULL. */
@@ -54,6 +79,8 @@ typedef struct cli_report_file {
 /** Make sure that the report can be written, before the work begins. inputs are [num_inputs] paths that must not be it.
  *  The caller ends *out with cli_report_commit or cli_report_discard. Errors: USAGE, IO, INTERNAL. */
 cli_exit cli_report_open(const char *path, int num_others, const char *const *others, cli_report_file *out, cli_failure *why);
+/** Do two paths name one file, which need not exist yet? */
+bool cli_is_same_file(const char *a, const char *b);
 /** Write the report and give the file its name. Errors: IO, INTERNAL; then nothing is left behind. */
 cli_exit cli_report_commit(cli_report_file *file, const cli_report *report, cli_failure *why);
 /** Leave nothing behind; harmless on a file that is not open. */

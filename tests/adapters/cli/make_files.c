@@ -22,6 +22,8 @@ typedef struct recipe {
   double      second_zone; /* not 0: a second zone, from there on */
   bool        is_ngon;     /* NGON_n and NFACE_n, one cell */
   bool        is_surface;  /* quadrilaterals only */
+  bool        masks;       /* a node Masks: Iblank, ChimeraCellType and others; Density is absurd in their holes */
+  bool        hole_column; /* the holes are the first cells along x of the second zone instead */
   bool        bow_tie;     /* one cell that is turned inside out over half of its width: its volume nearly cancels */
   bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices;
 } recipe;
@@ -45,6 +47,8 @@ static const recipe recipes[] = {
     {.name = "nan_field", .n = 2, .high = 1, .fields = 1, .nan_field = true},
     {.name = "at_vertices", .n = 2, .high = 1, .fields = 1, .at_vertices = true},
     {.name = "zones_overlap", .n = 2, .high = 1, .second_zone = .25},
+    {.name = "masked", .n = 4, .high = 1, .fields = 1, .masks = true},
+    {.name = "overset", .n = 2, .high = 1, .fields = 1, .masks = true, .second_zone = .5, .hole_column = true},
     {.name = "wide", .n = 4, .low = -1, .high = 2, .fields = 1},
     {.name = "bow_tie", .n = 1, .high = 1, .bow_tie = true},
 };
@@ -160,7 +164,16 @@ static void add_polyhedron(double zone, const recipe *r)
   add_1d(section, "ElementStartOffset", "DataArray_t", "I4", cells + 1, r->open_cell ? open_offset : face_offset);
 }
 
-static void add_solution(double zone, const recipe *r, const char *name, double value)
+/* What a cell is by its place along x: 1 computed, -1 interpolated, 0 hole. */
+static int kind_of(const recipe *r, bool is_second, int cell)
+{
+  const int i = cell % r->n;
+
+  if (r->hole_column) return !is_second || i > 0;
+  return i < 2 ? 1 : i == 2 ? -1 : 0;
+}
+
+static void add_solution(double zone, const recipe *r, bool is_second, const char *name, double value)
 {
   const int    cells = r->n * r->n * r->n, row = r->n + 1;
   const int    count    = r->at_vertices ? row * row * row : cells;
@@ -170,6 +183,7 @@ static void add_solution(double zone, const recipe *r, const char *name, double 
 
   add_text(solution, "GridLocation", "GridLocation_t", r->at_vertices ? "Vertex" : "CellCenter");
   for (int i = 0; i < count; i++) x[i] = value + .1 * sin(3 * i), flag[i] = i % 2;
+  for (int i = 0; i < count && r->masks; i++) x[i] = kind_of(r, is_second, i) ? value : 1e30;
   add_1d(solution, "Density", "DataArray_t", "R8", r->short_field ? count - 1 : count, x);
   for (int i = 0; i < count; i++) x[i] = r->nan_field && i == 2 ? NAN : cos(i);
   add_1d(solution, "MomentumX", "DataArray_t", "R8", count, x);
@@ -177,8 +191,36 @@ static void add_solution(double zone, const recipe *r, const char *name, double 
   add_1d(solution, "cellN", "DataArray_t", "I4", count, flag);
 }
 
-static void add_zone(double base, const recipe *r, const char *name, double low, double high)
+/* Masks by several conventions, some with real values, one that names no cell and one that is broken. */
+static void add_masks(double zone, const recipe *r, bool is_second)
 {
+  const double node = add(zone, "Masks", "DiscreteData_t", "MT", 0, NULL, NULL);
+  const int    n    = r->n * r->n * r->n;
+  float        iblank[MAX_CELLS], broken[MAX_CELLS];
+  double       cell_n[MAX_CELLS];
+  int          chimera[MAX_CELLS], none[MAX_CELLS];
+
+  for (int c = 0; c < n; c++) {
+    const int kind = kind_of(r, is_second, c);
+
+    iblank[c]  = (float)kind;
+    cell_n[c]  = kind < 0 ? 2 : kind;
+    chimera[c] = kind;
+    none[c]    = 0;
+    broken[c]  = c == n - 1 ? NAN : 1;
+  }
+  add_text(node, "GridLocation", "GridLocation_t", "CellCenter");
+  add_1d(node, "Iblank", "DataArray_t", "R4", n, iblank);
+  add_1d(node, "cellN", "DataArray_t", "R8", n, cell_n);
+  add_1d(node, "ChimeraCellType", "DataArray_t", "I4", n, chimera);
+  add_1d(node, "Nowhere", "DataArray_t", "I4", n, none);
+  add_1d(node, "Broken", "DataArray_t", "R4", n, broken);
+}
+
+static void add_zone(double base, const recipe *r, bool is_second)
+{
+  const char    *name = is_second ? "Second" : "Zone";
+  const double   low = is_second ? r->second_zone : r->low, high = low + r->high - r->low;
   const int      row = r->n + 1, count = row * row * row;
   const int      sizes[3] = {count, r->n * r->n * r->n, 0};
   const cgsize_t dims[2]  = {1, 3};
@@ -192,8 +234,9 @@ static void add_zone(double base, const recipe *r, const char *name, double low,
     add_polyhedron(zone, r);
   else
     add_hexahedra(zone, r);
-  if (r->fields != 0) add_solution(zone, r, "FlowSolution", r->fields);
-  if (r->second != 0) add_solution(zone, r, "Other", r->second);
+  if (r->fields != 0) add_solution(zone, r, is_second, "FlowSolution", r->fields);
+  if (r->second != 0) add_solution(zone, r, is_second, "Other", r->second);
+  if (r->masks) add_masks(zone, r, is_second);
 }
 
 static void write_file(const char *folder, const recipe *r)
@@ -208,8 +251,8 @@ static void write_file(const char *folder, const recipe *r)
   must(cgio_get_root_id(file, &root), path);
   add_1d(root, "CGNSLibraryVersion", "CGNSLibraryVersion_t", "R4", 1, &version);
   base = add_1d(root, "Base", "CGNSBase_t", "I4", 2, dimension);
-  add_zone(base, r, "Zone", r->low, r->high);
-  if (r->second_zone != 0) add_zone(base, r, "Second", r->second_zone, r->second_zone + r->high - r->low);
+  add_zone(base, r, false);
+  if (r->second_zone != 0) add_zone(base, r, true);
   must(cgio_close_file(file), path);
 }
 

@@ -20,7 +20,7 @@ is() {
 }
 
 works 2 good.cgns mesh.cgns -o out.cgns --report report.json
-keys "" version ranks source target overlap fields time memory notes
+keys "" version ranks source target overlap coverage fields time memory notes
 keys source file zones cells volume
 keys target file zones cells volume
 keys overlap pairs volume source_covered source_partial source_uncovered target_covered target_partial target_uncovered \
@@ -64,6 +64,11 @@ hold "$wrong" "names and globs choose fields"
 cmp -s one.cgns out.cgns
 [ $? = 1 ]
 hold $? "fewer fields make another file"
+
+works 1 good.cgns mesh.cgns -o one.cgns --report report.json --nature 'Tracer=conserved,Mom*=volume-mean' --nature Density=flag
+for row in "0 flag" "1 volume-mean" "2 conserved" "3 flag"; do is "${row#* }" fields "${row% *}" nature; done
+if grep -q "Tracer: its name" report.json; then complain "a nature that is given is not known"; fi
+hold "$wrong" "--nature says what fields are"
 
 works 2 good.cgns mesh.cgns -o one.cgns --report report.json -f Density --order 3 --limiter caas
 is 3 fields 0 order

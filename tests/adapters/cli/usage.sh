@@ -35,21 +35,24 @@ quick "a scale of 0 is refused" "--scale" good.cgns mesh.cgns -o out/result.cgns
 quick "a scale is a number" "--scale" good.cgns mesh.cgns -o out/result.cgns --scale 2x
 quick "a step is a number or last" "--step" good.cgns mesh.cgns -o out/result.cgns --step first
 quick "a step counts from 1" "--step" good.cgns mesh.cgns -o out/result.cgns --step 0
+quick "a nature is one of four" "'Density=heavy'" good.cgns mesh.cgns -o out/result.cgns --nature Density=heavy
+quick "a nature needs a name" "'conserved'" good.cgns mesh.cgns -o out/result.cgns --nature conserved
+quick "a nature is of a field" "no field 'Depth'" good.cgns mesh.cgns -o out/result.cgns --nature Tracer=conserved,Depth=flag
 quick "a value to fill with is a number" "fill=VALUE" good.cgns mesh.cgns -o out/result.cgns --on-uncovered fill=x
 quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out/result.cgns --step 1 --solution FlowSolution
 for option in order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
-for option in source-mask target-mask priority supermesh gamma nature check cgns-version; do
+for option in priority supermesh gamma check cgns-version; do
   quick "--$option is not offered" "'--$option'" good.cgns mesh.cgns -o out/result.cgns "--$option" x
 done
 
 works 1 --help
-for option in fields order limiter faces on-uncovered on-partial solution step output-solution source-base target-base scale \
-  transform report output quiet verbose version help; do
+for option in fields nature order limiter faces on-uncovered on-partial solution step output-solution source-base target-base scale \
+  transform coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
-if grep -E 'mask|priority|supermesh|gamma|--check' stdout; then complain "--help offers too much"; fi
+if grep -E 'priority|supermesh|gamma|--check' stdout; then complain "--help offers too much"; fi
 [ "$(awk 'length > 128' stdout)" = "" ] || complain "--help is wide"
 hold "$wrong" "--help says every option, and no other"
 works 2 --version
