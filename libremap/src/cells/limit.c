@@ -248,9 +248,9 @@ static remap_status touch_cell(edge_query *q, rm_lid j)
   const rm_trimesh *m2 = b->l->o->mesh[1];
   double            at[6];
 
-  if (j >= 0 && m2->cell_edge_offset[j] < m2->cell_edge_offset[j + 1]) {
-    for (rm_lid k = m2->cell_edge_offset[j]; k < m2->cell_edge_offset[j + 1]; k++)
-      if (touch_edge(q, m2->cell_edge[k])) break;
+  if (j >= 0 && m2->cell_vertex_offset[j] < m2->cell_vertex_offset[j + 1]) {
+    for (rm_lid k = m2->cell_triangle_offset[j]; k < m2->cell_triangle_offset[j + 1]; k++)
+      if (touch_edges_of(q, m2->cell_triangle[k] / 2)) break;
     return q->status;
   }
   for (int c = 0; c < 3; c++) at[c] = fmin(q->p0[c], q->p1[c]), at[c + 3] = fmax(q->p0[c], q->p1[c]);

@@ -47,10 +47,7 @@ typedef struct rm_trimesh {
   const rm_lid  *cell_triangle;         /* 2 * triangle + (1 if the cell is its right one), ascending            */
   const rm_lid  *cell_vertex_offset;    /* [num_cells + 1] a cell of many triangles has none of what follows     */
   const rm_lid  *cell_vertex;           /* vertices of the cell                                                  */
-  const rm_lid  *cell_edge_offset;      /* [num_cells + 1]                                                       */
-  const rm_lid  *cell_edge;             /* edges of the cell                                                     */
-  const uint8_t (*cell_edge_end)[2];    /* [same] their ends, as places in the cell's vertices                   */
-  const uint8_t (*cell_triangle_edge)[3]; /* [cell_triangle_offset[num_cells]] as places in the cell's edges     */
+  const uint8_t (*cell_triangle_vertex)[3]; /* [cell_triangle_offset[num_cells]] corners, as places in the cell's vertices */
   const double (*cell_box)[6];          /* [num_cells] min x, y, z, max x, y, z                                  */
   const uint8_t *cell_walk;             /* [num_cells] RM_WALK_                                                   */
   double         box[6];                /* of all vertices; min > max if there are none                          */

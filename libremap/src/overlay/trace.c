@@ -1,10 +1,13 @@
 /* trace -- edge tracing with label colouring (DESIGN 2.3).
  *
- * One vertex per connected component is located by a ray; every edge then carries the state of one end to the other, and so the
- * whole mesh is coloured. In a cell, the signs of the edge's line against the cell's edges tell through which triangle it leaves.
- * The signs are taken in a frame sheared so that the edge runs along an axis: two products per edge of the cell, with one error
- * bound for the cell; what that cannot decide goes to the exact predicate. Cost: O(edges of the cell) per crossing by adjacency,
- * O(log n + hits) per edge by the box tree. */
+ * Vertices are taken in their order, which is that of space, and every edge carries the state of its first vertex to its second.
+ * A vertex that no edge has reached before gets its state from the vertex before it, by a walk along the straight line between
+ * them, the first one from a point outside. So crossings are found in the order of their edges.
+ *
+ * In a cell, the edge's line is looked along: the cell's vertices are taken in a frame sheared so that the edge runs along an axis,
+ * and a triangle is crossed if the line, now a point, lies in it. Most triangles lie to one side as a whole, which bits per vertex
+ * tell; for the others it takes three determinants of 2x2, with one error bound for the cell. What the bound cannot decide goes to
+ * the exact predicate. Cost: O(triangles of the cell) per crossing by adjacency, O(log n + hits) per edge by the box tree. */
 #include "overlay/trace.h"
 
 #include <math.h>
@@ -18,12 +21,21 @@ typedef struct hit {
   int    sign;
 } hit;
 
-enum { MAX_LOCAL = 256 };
+enum {
+  MAX_LOCAL = 256,
+  CLEARANCE = 3 /* lengths of an edge around it that are to be free of skin */
+};
 
 /* Error of an edge's side against a line in the sheared frame, by the square of the reach of its coordinates. With u = 2^-53:
  * differences err by u, shears by 3 u, so sheared coordinates, at most 2 reach, by 8 u reach; their products and the difference of
  * these by less than 80 u reach^2. */
 #define LINE_NOISE 0x1p-46
+/* Of a sheared coordinate, by the reach. */
+#define POINT_NOISE 0x1p-49
+/* Of the sum, over a triangle's corners, of such a side by the corner's height over the edge's end, by the square of the reach and the
+ * largest height: three products, each off by 80 u reach^2 times the height and 8 reach^2 times 4 u of it, and their sum by as much
+ * again. */
+#define HEIGHT_NOISE 0x1p-43
 
 typedef struct tracer {
   const rm_trimesh *own, *other;
@@ -33,21 +45,23 @@ typedef struct tracer {
   rm_states         states;
   const rm_boxtree *all_tree; /* over all triangles of other; built when first needed */
   double          (*all_box)[6];
-  hit              *hits;     /* crossings of the present edge, in walking order */
+  hit              *hits; /* crossings of the present edge, ascending along it */
   int64_t           hits_room;
   int               num_hits;
   hit              *skin_hits; /* crossings of the present edge with the skin, ascending along it */
   int64_t           skin_room;
   int               num_skin; /* -1: not asked for yet */
+  const double     *tried;       /* start of the edge for which clear was sought last */
+  double            clear[6];    /* a box that no skin enters                         */
   rm_crossing      *crossing;
   int64_t           num_crossings, crossing_room;
   int64_t          *first;
   rm_lid           *count, *state;
-  /* the present edge, or ray */
+  /* the present edge */
   const double     *p0, *p1;
-  double            beyond[3]; /* far end of a ray */
   double            u[3], shear[2]; /* p1 - p0; u[axis[0]] / u[axis[2]], u[axis[1]] / u[axis[2]] */
   int               axis[3];        /* axis[2] is the edge's longest direction; a cyclic permutation of x, y, z */
+  int               turn;           /* -1 if the edge runs down that axis, else 1 */
 } tracer;
 
 static void set_line(tracer *t, const double *p0, const double *p1)
@@ -61,16 +75,10 @@ static void set_line(tracer *t, const double *p0, const double *p1)
   t->axis[2] = k;
   t->axis[0] = (k + 1) % 3;
   t->axis[1] = (k + 2) % 3;
+  t->turn    = t->u[k] < 0 ? -1 : 1;
   t->shear[0] = t->u[t->axis[0]] / t->u[k];
   t->shear[1] = t->u[t->axis[1]] / t->u[k];
   t->num_skin = -1;
-}
-
-/* Sign with which the edge's line crosses the triangle, from the exact sides of its three edges: +1 along the normal; 0: misses. */
-static inline int crossing_sign(int s01, int s12, int s02)
-{
-  const int sum = s01 + s12 - s02;
-  return sum == 3 ? 1 : sum == -3 ? -1 : 0;
 }
 
 static int edge_side(const tracer *t, rm_lid f)
@@ -79,7 +87,15 @@ static int edge_side(const tracer *t, rm_lid f)
   return rm_edge_side(t->p0, t->p1, m->vertex[m->edge[f][0]], m->vertex[m->edge[f][1]], t->moved, NULL);
 }
 
-/* What the filter of line_sides tells about one triangle: true if the present edge's line passes it by. */
+/* Sign with which the present edge's line crosses triangle b. Exact. */
+static int line_crosses(const tracer *t, rm_lid b)
+{
+  const rm_lid *e = t->other->triangle_edge[b];
+  const int     s = edge_side(t, e[0]);
+  return s && edge_side(t, e[1]) == s && edge_side(t, e[2]) == -s ? s : 0;
+}
+
+/* What the filter of crosses tells about one triangle: true if the present edge's line passes it by. */
 static bool surely_misses(const tracer *t, rm_lid b)
 {
   const int    i = t->axis[0], j = t->axis[1], k = t->axis[2];
@@ -113,13 +129,8 @@ static int end_side(const tracer *t, rm_lid b, const double *p)
 /* Sign of the crossing of the present edge with triangle b, or 0 if they do not meet. Exact. */
 static int meets(const tracer *t, rm_lid b)
 {
-  const rm_lid *e = t->other->triangle_edge[b];
-  const int     a = edge_side(t, e[0]);
-  int           s;
-
-  if (!a || edge_side(t, e[1]) != a || edge_side(t, e[2]) != -a) return 0;
-  s = a;
-  return end_side(t, b, t->p0) == -s && end_side(t, b, t->p1) == s ? s : 0;
+  const int s = line_crosses(t, b);
+  return s && end_side(t, b, t->p0) == -s && end_side(t, b, t->p1) == s ? s : 0;
 }
 
 /* -1, 0, +1: triangle a is crossed before, with, after triangle b going from p0 to p1. Exact. */
@@ -211,6 +222,26 @@ static remap_status all_hits(tracer *t)
   return REMAP_OK;
 }
 
+/* True if the edge's box lies in one that no skin enters. Around a new start, such a box is sought. */
+static bool is_clear(tracer *t)
+{
+  double box[6], room[6], size = 0;
+  bool   inside = true;
+
+  for (int c = 0; c < 3; c++) {
+    box[c]     = t->p0[c] < t->p1[c] ? t->p0[c] : t->p1[c];
+    box[c + 3] = t->p0[c] < t->p1[c] ? t->p1[c] : t->p0[c];
+    size       = box[c + 3] - box[c] > size ? box[c + 3] - box[c] : size;
+    inside     = inside && box[c] >= t->clear[c] && box[c + 3] <= t->clear[c + 3];
+  }
+  if (inside || t->tried == t->p0) return inside;
+  t->tried = t->p0;
+  for (int c = 0; c < 3; c++) room[c] = box[c] - CLEARANCE * size, room[c + 3] = box[c + 3] + CLEARANCE * size;
+  if (rm_boxtree_meets(t->other->skin_tree, t->other->skin_box, room)) return false;
+  memcpy(t->clear, room, sizeof t->clear);
+  return true;
+}
+
 static remap_status need_skin_hits(tracer *t)
 {
   collect c = {t, t->other->skin, &t->skin_hits, &t->skin_room, &t->num_skin, REMAP_OK};
@@ -228,106 +259,151 @@ static remap_status need_skin_hits(tracer *t)
 /* What lies ahead on the walk: a crossing, the edge's end, or something adjacency cannot answer. */
 typedef enum ahead { AHEAD_CROSSING, AHEAD_END, AHEAD_TANGLED } ahead;
 
-/* Signs of the present edge's line against the edges of cell c. Exact. */
-static void line_sides(const tracer *t, rm_lid c, int8_t *side)
+/* The vertices of a cell as seen along the present edge, from p0, which is at (0, 0, 0). */
+typedef struct view {
+  double  x[MAX_LOCAL], y[MAX_LOCAL], z[MAX_LOCAL];
+  uint8_t beside[MAX_LOCAL]; /* bits: surely to the right of the line, to the left, above, below */
+  double  reach;             /* largest difference to p0 along any axis                          */
+} view;
+
+/* Two numbers side by side, one in each lane of a vector register, and what comparing them gives. */
+typedef double  lanes __attribute__((vector_size(16)));
+typedef int64_t flags __attribute__((vector_size(16)));
+
+static void look_along(const tracer *t, rm_lid c, view *w)
 {
   const rm_trimesh *m = t->other;
-  const rm_lid  first = m->cell_vertex_offset[c], nv = m->cell_vertex_offset[c + 1] - first;
-  const rm_lid  first_edge = m->cell_edge_offset[c], ne = m->cell_edge_offset[c + 1] - first_edge;
-  const uint8_t (*end)[2] = m->cell_edge_end + first_edge;
+  const rm_lid *restrict vertex = m->cell_vertex + m->cell_vertex_offset[c];
+  const rm_lid  nv = m->cell_vertex_offset[c + 1] - m->cell_vertex_offset[c];
   const int     i = t->axis[0], j = t->axis[1], k = t->axis[2];
-  const double  pi = t->p0[i], pj = t->p0[j], pk = t->p0[k], si = t->shear[0], sj = t->shear[1];
-  const double  flip = t->u[k] < 0 ? -1 : 1;
-  const double *box = m->cell_box[c];
-  double        x[MAX_LOCAL], y[MAX_LOCAL], reach = 0;
-  int           undecided = 0;
+  const lanes   p = {t->p0[i], t->p0[j]}, shear = {t->shear[0], t->shear[1]};
+  const double  pz = t->p0[k], *box = m->cell_box[c];
+  double        reach = 0;
 
   for (int a = 0; a < 3; a++) {
     const double low = fabs(box[a] - t->p0[a]), high = fabs(box[a + 3] - t->p0[a]);
     reach = low > reach ? low : reach;
     reach = high > reach ? high : reach;
   }
+  const double near = POINT_NOISE * reach;
+  const lanes  above = {near, near}, below = {-near, -near};
   for (rm_lid v = 0; v < nv; v++) {
-    const double *q = m->vertex[m->cell_vertex[first + v]];
-    const double  z = q[k] - pk;
-    x[v] = ((q[i] - pi) - si * z) * flip;
-    y[v] = (q[j] - pj) - sj * z;
+    const double *q = m->vertex[vertex[v]], z = q[k] - pz;
+    const lanes   at = ((lanes){q[i], q[j]} - p) - shear * (lanes){z, z};
+    const flags   side = ((flags)(at > above) & (flags){1, 4}) | ((flags)(at < below) & (flags){2, 8});
+    w->x[v]      = at[0];
+    w->y[v]      = at[1];
+    w->z[v]      = z;
+    w->beside[v] = (uint8_t)(side[0] | side[1]);
   }
-  const double bound = LINE_NOISE * reach * reach;
-  for (rm_lid f = 0; f < ne; f++) {
-    const double d = x[end[f][0]] * y[end[f][1]] - x[end[f][1]] * y[end[f][0]];
-    const int    s = (d > bound) - (d < -bound);
-    side[f] = (int8_t)s;
-    undecided += s == 0;
+  w->reach = reach;
+}
+
+/* The sides of triangle v against the line, as determinants of 2x2: all positive or all negative if it is crossed. */
+static inline void sides(const view *w, const uint8_t v[3], double d[3])
+{
+  for (int h = 0; h < 3; h++) d[h] = w->x[v[h]] * w->y[v[(h + 1) % 3]] - w->x[v[(h + 1) % 3]] * w->y[v[h]];
+}
+
+/* Sign with which the line crosses triangle b, whose vertices are v in the view. Exact. */
+static inline int crosses(const tracer *t, const view *w, const uint8_t v[3], rm_lid b)
+{
+  const double bound = LINE_NOISE * w->reach * w->reach;
+  double       d[3];
+  int          along = 0, against = 0;
+
+  sides(w, v, d);
+  for (int h = 0; h < 3; h++) {
+    along += d[h] > bound;
+    against += d[h] < -bound;
   }
-  if (undecided)
-    for (rm_lid f = 0; f < ne; f++)
-      if (!side[f]) side[f] = (int8_t)edge_side(t, m->cell_edge[first_edge + f]);
+  if (along && against) return 0;
+  if (along == 3 || against == 3) return along ? t->turn : -t->turn;
+  return line_crosses(t, b);
+}
+
+/* The edge ends before it meets triangle next, which its line crosses. Exact. */
+static inline bool ends_before(const tracer *t, const view *w, const uint8_t v[3], hit next)
+{
+  const double end = t->u[t->axis[2]], largest = w->reach + fabs(end);
+  double       d[3], sum;
+
+  sides(w, v, d);
+  sum = d[1] * (w->z[v[0]] - end) + d[2] * (w->z[v[1]] - end) + d[0] * (w->z[v[2]] - end); /* of the sign of d, turned */
+  if (fabs(sum) > HEIGHT_NOISE * w->reach * w->reach * largest) return (sum > 0) == (next.sign > 0);
+  return end_side(t, next.triangle, t->p1) != next.sign;
 }
 
 /* The crossing ahead of `last` (triangle -1: the walk's start) among those of the line with cell c when there are several. */
-static ahead nearest_hit(const tracer *t, const hit *list, int n, hit last, int dir, hit *next)
+static ahead nearest_hit(const tracer *t, const hit *list, int n, hit last, int *next)
 {
-  const double *start = dir > 0 ? t->p0 : t->p1;
-  int           best = -1;
+  int best = -1;
 
   for (int k = 0; k < n; k++) {
     if (list[k].triangle == last.triangle) continue;
-    const bool is_ahead = last.triangle < 0 ? end_side(t, list[k].triangle, start) == -list[k].sign * dir
-                                            : order(t, last.triangle, list[k].triangle) * dir < 0;
+    const bool is_ahead = last.triangle < 0 ? end_side(t, list[k].triangle, t->p0) == -list[k].sign
+                                            : order(t, last.triangle, list[k].triangle) < 0;
     if (!is_ahead) continue;
     if (best >= 0) {
-      const int o = order(t, list[k].triangle, list[best].triangle) * dir;
+      const int o = order(t, list[k].triangle, list[best].triangle);
       if (o == 0) return AHEAD_TANGLED;
       if (o > 0) continue;
     }
     best = k;
   }
-  if (best < 0) return AHEAD_TANGLED;
-  *next = list[best];
-  return AHEAD_CROSSING;
+  *next = best;
+  return best < 0 ? AHEAD_TANGLED : AHEAD_CROSSING;
 }
 
-/* Where the walk leaves cell c, which it entered through `last` or starts in. dir: +1 from p0 to p1. */
-static ahead leave_cell(const tracer *t, rm_lid c, hit last, int dir, hit *next)
+/* Where the walk leaves cell c, which it entered through `last` or starts in. */
+static ahead leave_cell(const tracer *t, rm_lid c, hit last, hit *next)
 {
   const rm_trimesh *m = t->other;
   const rm_lid  first = m->cell_triangle_offset[c], nt = m->cell_triangle_offset[c + 1] - first;
-  const uint8_t (*edge)[3] = m->cell_triangle_edge + first;
-  int8_t        side[MAX_LOCAL];
-  hit           list[2 * MAX_LOCAL];
-  int           n = 0, exits = 0, exit = 0;
+  const rm_lid *triangle = m->cell_triangle + first;
+  const uint8_t (*vertex)[3] = m->cell_triangle_vertex + first;
+  view    w;
+  uint8_t near[MAX_LOCAL], place[MAX_LOCAL];
+  hit     list[MAX_LOCAL];
+  int     num_near = 0, n = 0, exits = 0, exit = 0;
 
-  line_sides(t, c, side);
+  look_along(t, c, &w);
   for (rm_lid a = 0; a < nt; a++) {
-    const int s = crossing_sign(side[edge[a][0]], side[edge[a][1]], side[edge[a][2]]);
+    near[num_near] = (uint8_t)a;
+    num_near += !(w.beside[vertex[a][0]] & w.beside[vertex[a][1]] & w.beside[vertex[a][2]]);
+  }
+  for (int k = 0; k < num_near; k++) {
+    const rm_lid a = near[k], b = triangle[a] / 2;
+    const int    s = b == last.triangle ? last.sign : crosses(t, &w, vertex[a], b);
+
     if (!s) continue;
-    list[n] = (hit){m->cell_triangle[first + a] / 2, s};
-    if (((m->cell_triangle[first + a] & 1) ? -s : s) * dir > 0) exits++, exit = n;
+    list[n]  = (hit){b, s};
+    place[n] = near[k];
+    if ((triangle[a] & 1 ? -s : s) > 0) exits++, exit = n;
     n++;
   }
   if (exits == 1 && n == 2) { /* in once, out once */
-    *next = list[exit];
-    if (next->triangle == last.triangle) return AHEAD_TANGLED;
+    if (list[exit].triangle == last.triangle) return AHEAD_TANGLED;
   } else {
-    if (nearest_hit(t, list, n, last, dir, next) != AHEAD_CROSSING) return AHEAD_TANGLED;
-    if (m->side[next->triangle][next->sign * dir > 0 ? 0 : 1] != c) return AHEAD_TANGLED;
+    if (nearest_hit(t, list, n, last, &exit) != AHEAD_CROSSING) return AHEAD_TANGLED;
+    if (m->side[list[exit].triangle][list[exit].sign > 0 ? 0 : 1] != c) return AHEAD_TANGLED;
   }
-  return end_side(t, next->triangle, dir > 0 ? t->p1 : t->p0) == next->sign * dir ? AHEAD_CROSSING : AHEAD_END;
+  *next = list[exit];
+  return ends_before(t, &w, vertex[place[exit]], *next) ? AHEAD_END : AHEAD_CROSSING;
 }
 
 /* Where the walk meets the skin again from outside. */
-static ahead enter_mesh(const tracer *t, hit last, int dir, hit *next)
+static ahead enter_mesh(const tracer *t, hit last, hit *next)
 {
   for (int k = 0; k < t->num_skin; k++) {
-    const hit h = t->skin_hits[dir > 0 ? k : t->num_skin - 1 - k];
+    const hit h = t->skin_hits[k];
     if (last.triangle >= 0) {
-      const int o = order(t, last.triangle, h.triangle) * dir;
+      const int o = order(t, last.triangle, h.triangle);
       if (h.triangle == last.triangle || o > 0) continue;
       if (o == 0) return AHEAD_TANGLED;
     }
     *next = h;
-    return t->other->side[h.triangle][h.sign * dir > 0 ? 0 : 1] == RM_OUTSIDE ? AHEAD_CROSSING : AHEAD_TANGLED;
+    return t->other->side[h.triangle][h.sign > 0 ? 0 : 1] == RM_OUTSIDE ? AHEAD_CROSSING : AHEAD_TANGLED;
   }
   return AHEAD_END;
 }
@@ -337,7 +413,7 @@ typedef enum walked { WALKED, WALK_TOGETHER, WALK_NOT } walked;
 
 /* Follow the present edge from cell *at, entered through `last` or started in, until it ends or comes out of the mesh; *at becomes
  * where it is then. Cells may ask for no more than `most`, an RM_WALK_. */
-static remap_status follow(tracer *t, rm_lid *at, hit *last, int dir, int most, walked *how)
+static remap_status follow(tracer *t, rm_lid *at, hit *last, int most, walked *how)
 {
   hit next = {-1, 0};
 
@@ -346,42 +422,42 @@ static remap_status follow(tracer *t, rm_lid *at, hit *last, int dir, int most, 
       *how = t->other->cell_walk[*at] == RM_WALK_NOT ? WALK_NOT : WALK_TOGETHER;
       return REMAP_OK;
     }
-    const ahead what = leave_cell(t, *at, *last, dir, &next);
+    const ahead what = leave_cell(t, *at, *last, &next);
     if (what == AHEAD_TANGLED || t->num_hits > 2 * t->other->num_triangles) {
       *how = WALK_NOT;
       return REMAP_OK;
     }
     if (what == AHEAD_END) break;
     RM_TRY(push_hit(t, next.triangle, next.sign));
-    *at   = t->other->side[next.triangle][next.sign * dir > 0 ? 1 : 0];
+    *at   = t->other->side[next.triangle][next.sign > 0 ? 1 : 0];
     *last = next;
   }
   *how = WALKED;
   return REMAP_OK;
 }
 
-/* Walk the present edge from one end, in state *state there, to the other, in one cell or outside all the way. hits receive the
- * crossings in walking order, *state the state at the far end; it is unchanged unless *how is WALKED. */
-static remap_status walk_alone(tracer *t, int dir, rm_lid *state, walked *how)
+/* Walk the present edge from its start, in state *state, to its end, in one cell or outside all the way. hits receive the crossings;
+ * *state becomes the state at the end, but is unchanged unless *how is WALKED. */
+static remap_status walk_alone(tracer *t, rm_lid *state, walked *how)
 {
   rm_lid at   = *state;
   hit    last = {-1, 0}, next;
   ahead  what;
 
   t->num_hits = 0;
-  *how        = WALK_TOGETHER;
-  if (at < RM_OUTSIDE) return REMAP_OK;
+  *how        = at == RM_OUTSIDE && is_clear(t) ? WALKED : WALK_TOGETHER;
+  if (at < RM_OUTSIDE || *how == WALKED) return REMAP_OK;
   for (;;) {
-    RM_TRY(follow(t, &at, &last, dir, RM_WALK_ALONE, how));
+    RM_TRY(follow(t, &at, &last, RM_WALK_ALONE, how));
     if (*how != WALKED) return REMAP_OK;
     if (at >= 0) break;
     RM_TRY(need_skin_hits(t));
-    what = enter_mesh(t, last, dir, &next);
+    what = enter_mesh(t, last, &next);
     if (what == AHEAD_TANGLED) *how = WALK_NOT;
     if (what == AHEAD_TANGLED) return REMAP_OK;
     if (what == AHEAD_END) break;
     RM_TRY(push_hit(t, next.triangle, next.sign));
-    at   = t->other->side[next.triangle][next.sign * dir > 0 ? 1 : 0];
+    at   = t->other->side[next.triangle][next.sign > 0 ? 1 : 0];
     last = next;
   }
   *state = at;
@@ -390,8 +466,8 @@ static remap_status walk_alone(tracer *t, int dir, rm_lid *state, walked *how)
 
 /* Where skins overlap or nearly so, the edge may be in several cells at once. Each of them is followed by itself, from the start or
  * from the skin where it comes in, to the end or to the skin where it goes out: star-shaped cells joined by their faces know of no
- * others. hits receive all crossings, ascending along the edge. */
-static remap_status walk_together(tracer *t, int dir, rm_lid state, walked *how)
+ * others. hits receive all crossings. */
+static remap_status walk_together(tracer *t, rm_lid state, walked *how)
 {
   const rm_lid     *side;
   const rm_winding  single = {state, 1}, *list = &single;
@@ -414,14 +490,14 @@ static remap_status walk_together(tracer *t, int dir, rm_lid state, walked *how)
     } else {
       last = t->skin_hits[k - num];
       side = t->other->side[last.triangle];
-      at   = side[last.sign * dir > 0 ? 1 : 0];
+      at   = side[last.sign > 0 ? 1 : 0];
       if (at < 0) {
         going_out++;
         continue;
       }
       RM_TRY(push_hit(t, last.triangle, last.sign));
     }
-    RM_TRY(follow(t, &at, &last, dir, RM_WALK_TOGETHER, how));
+    RM_TRY(follow(t, &at, &last, RM_WALK_TOGETHER, how));
     if (*how != WALKED) return REMAP_OK;
     out += at < 0;
   }
@@ -438,48 +514,27 @@ static double parameter(const tracer *t, rm_lid b)
   return rm_crossing_parameter(t->p0, t->p1, t->other->vertex[v[0]], t->other->vertex[v[1]], t->other->vertex[v[2]]);
 }
 
-static void reverse(hit *h, int n)
+/* The crossings of the line from p0 to p1, which need not be an edge, into t->hits. *state, that of p0, becomes that of p1. */
+static remap_status find_hits(tracer *t, const double *p0, const double *p1, rm_lid *state)
 {
-  for (int i = 0, k = n - 1; i < k; i++, k--) {
-    const hit x = h[i];
-    h[i]        = h[k];
-    h[k]        = x;
-  }
-}
-
-/* The edge's box misses the box of the other mesh. */
-static bool is_far(const tracer *t, rm_lid e)
-{
-  const double *p = t->own->vertex[t->own->edge[e][0]], *q = t->own->vertex[t->own->edge[e][1]], *box = t->other->box;
-
-  for (int c = 0; c < 3; c++)
-    if ((p[c] < box[c] && q[c] < box[c]) || (p[c] > box[c + 3] && q[c] > box[c + 3])) return true;
-  return false;
-}
-
-/* Trace edge e from the end that has state *state; *state becomes the other end's. */
-static remap_status trace_edge(tracer *t, rm_lid e, int dir, rm_lid *state)
-{
-  rm_lid at  = *state;
   walked how = WALK_NOT;
 
-  if (at == RM_OUTSIDE && is_far(t, e)) {
-    t->first[e] = t->num_crossings;
-    t->count[e] = 0;
-    t->state[e] = RM_OUTSIDE;
-    return REMAP_OK;
-  }
-  set_line(t, t->own->vertex[t->own->edge[e][0]], t->own->vertex[t->own->edge[e][1]]);
-  if (!t->by_tree) RM_TRY(walk_alone(t, dir, state, &how));
-  if (how == WALKED) {
-    if (dir < 0) reverse(t->hits, t->num_hits);
-  } else {
-    if (how == WALK_TOGETHER) RM_TRY(walk_together(t, dir, *state, &how));
-    if (how != WALKED) RM_TRY(all_hits(t));
-    for (int k = 0; k < t->num_hits; k++)
-      RM_TRY(rm_states_cross(&t->states, *state, t->other->side[t->hits[k].triangle], t->hits[k].sign * dir, state));
-  }
-  at = dir > 0 ? at : *state;
+  set_line(t, p0, p1);
+  if (!t->by_tree) RM_TRY(walk_alone(t, state, &how));
+  if (how == WALKED) return REMAP_OK;
+  if (how == WALK_TOGETHER) RM_TRY(walk_together(t, *state, &how));
+  if (how != WALKED) RM_TRY(all_hits(t));
+  for (int k = 0; k < t->num_hits; k++)
+    RM_TRY(rm_states_cross(&t->states, *state, t->other->side[t->hits[k].triangle], t->hits[k].sign, state));
+  return REMAP_OK;
+}
+
+/* Trace edge e, whose first vertex has state *state; *state becomes the second one's. */
+static remap_status trace_edge(tracer *t, rm_lid e, rm_lid *state)
+{
+  rm_lid at = *state;
+
+  RM_TRY(find_hits(t, t->own->vertex[t->own->edge[e][0]], t->own->vertex[t->own->edge[e][1]], state));
   RM_TRY(rm_grow(&t->crossing, &t->crossing_room, t->num_crossings + t->num_hits, sizeof *t->crossing));
   t->first[e] = t->num_crossings;
   t->count[e] = t->num_hits;
@@ -494,81 +549,70 @@ static remap_status trace_edge(tracer *t, rm_lid e, int dir, rm_lid *state)
 
 /* ---- the whole mesh ---------------------------------------------------------------------------------------------- */
 
-/* State of a point, by a ray along x to beyond the other mesh. */
-static remap_status locate(tracer *t, const double *p, rm_lid *state)
+enum {
+  UNKNOWN = INT32_MAX, /* no state yet */
+  STEP    = 1 << 14    /* edges between two calls of progress */
+};
+
+/* Bits: below and above the box along x, y, z. An edge whose ends share one misses all that is in the box. */
+static uint8_t beyond(const double box[6], const double p[3])
 {
-  const rm_trimesh *m = t->other;
+  int bits = 0;
 
-  *state = RM_OUTSIDE;
-  if (p[0] > m->box[3] || p[1] < m->box[1] || p[1] > m->box[4] || p[2] < m->box[2] || p[2] > m->box[5]) return REMAP_OK;
-  t->beyond[0] = 2; /* every coordinate is below 1 in magnitude */
-  t->beyond[1] = p[1], t->beyond[2] = p[2];
-  set_line(t, p, t->beyond);
-  if (t->all_tree) {
-    RM_TRY(all_hits(t));
-    for (int k = 0; k < t->num_hits; k++)
-      RM_TRY(rm_states_cross(&t->states, *state, m->side[t->hits[k].triangle], -t->hits[k].sign, state));
-    return REMAP_OK;
-  }
-  for (rm_lid b = 0; b < m->num_triangles; b++) {
-    const double *v[3] = {m->vertex[m->triangle[b][0]], m->vertex[m->triangle[b][1]], m->vertex[m->triangle[b][2]]};
-
-    if ((v[0][1] < p[1] && v[1][1] < p[1] && v[2][1] < p[1]) || (v[0][1] > p[1] && v[1][1] > p[1] && v[2][1] > p[1])) continue;
-    if ((v[0][2] < p[2] && v[1][2] < p[2] && v[2][2] < p[2]) || (v[0][2] > p[2] && v[1][2] > p[2] && v[2][2] > p[2])) continue;
-    if (v[0][0] < p[0] && v[1][0] < p[0] && v[2][0] < p[0]) continue;
-    const int s = meets(t, b);
-    if (s) RM_TRY(rm_states_cross(&t->states, *state, m->side[b], -s, state));
-  }
-  return REMAP_OK;
+  for (int c = 0; c < 3; c++) bits |= (p[c] < box[c]) << 2 * c | (p[c] > box[c + 3]) << (2 * c + 1);
+  return (uint8_t)bits;
 }
 
-enum {
-  UNKNOWN       = INT32_MAX, /* no state yet */
-  LOCATED_PLAIN = 4,         /* so many components are located without a tree */
-  STEP          = 1 << 14    /* edges between two calls of progress */
-};
+/* State of vertex v, from that of vertex `before`, -1: from a point outside. */
+static remap_status locate(tracer *t, rm_lid v, rm_lid before, rm_lid *where)
+{
+  const double *p = t->own->vertex[v], outside[3] = {2, p[1], p[2]}; /* every coordinate is below 1 in magnitude */
+
+  where[v] = before < 0 ? RM_OUTSIDE : where[before];
+  return find_hits(t, before < 0 ? outside : t->own->vertex[before], p, &where[v]);
+}
 
 static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_edge)
 {
   const rm_trimesh *m = t->own;
-  rm_lid           *where, *stack, depth = 0, done = 0, components = 0;
+  rm_lid           *where, last = -1;
+  uint8_t          *far;
 
   RM_NEW(where, t->scratch, m->num_vertices);
-  RM_NEW(stack, t->scratch, m->num_vertices);
-  for (rm_lid v = 0; v < m->num_vertices; v++) where[v] = UNKNOWN;
-  for (rm_lid e = 0; e < m->num_edges; e++) t->count[e] = -1;
-  for (rm_lid seed = 0; seed < m->num_vertices; seed++) {
-    if (where[seed] != UNKNOWN) continue;
-    if (++components == LOCATED_PLAIN) RM_TRY(need_all_tree(t));
-    RM_TRY(locate(t, m->vertex[seed], &where[seed]));
-    stack[depth++] = seed;
-    while (depth > 0) {
-      const rm_lid v = stack[--depth];
+  RM_NEW(far, t->scratch, m->num_vertices);
+  for (rm_lid v = 0; v < m->num_vertices; v++) {
+    far[v]   = beyond(t->other->box, m->vertex[v]);
+    where[v] = far[v] ? RM_OUTSIDE : UNKNOWN;
+  }
+  for (rm_lid e = 0; e < m->num_edges; e++) {
+    const rm_lid v = m->edge[e][0], w = m->edge[e][1];
+    rm_lid       state;
 
-      for (rm_lid k = m->vertex_edge_offset[v]; k < m->vertex_edge_offset[v + 1]; k++) {
-        const rm_lid e = m->vertex_edge[k], dir = m->edge[e][0] == v ? 1 : -1, w = m->edge[e][dir > 0 ? 1 : 0];
-        rm_lid       state = where[v];
-
-        if (t->count[e] >= 0) continue;
-        RM_TRY(trace_edge(t, e, dir, &state));
-        if (where[w] == UNKNOWN) where[w] = state, stack[depth++] = w;
-        if (where[w] != state) {
-          *bad_edge = e;
-          return REMAP_INCONSISTENT;
-        }
-        if (++done % STEP == 0 && progress && progress->call &&
-            progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges", (double)done / m->num_edges))
-          return REMAP_CANCELLED;
-      }
+    if (e % STEP == STEP - 1 && progress && progress->call &&
+        progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges", (double)e / m->num_edges))
+      return REMAP_CANCELLED;
+    if (far[v] & far[w]) {
+      t->first[e] = t->num_crossings;
+      t->count[e] = 0;
+      t->state[e] = RM_OUTSIDE;
+      continue;
+    }
+    if (where[v] == UNKNOWN) RM_TRY(locate(t, v, last, where));
+    last  = v;
+    state = where[v];
+    RM_TRY(trace_edge(t, e, &state));
+    if (where[w] == UNKNOWN) where[w] = state;
+    if (where[w] != state) {
+      *bad_edge = e;
+      return REMAP_INCONSISTENT;
     }
   }
   return REMAP_OK;
 }
 
-/* The crossings in the order of their edges, as neighbours in space are neighbours in memory then. */
+/* What has grown on the way, in the arena. */
 static remap_status keep(rm_arena *arena, const tracer *t, rm_trace *out)
 {
-  int64_t     *first;
   const rm_lid num_winding = t->states.offset[t->states.num];
   rm_crossing *crossing;
   rm_lid      *offset;
@@ -577,26 +621,23 @@ static remap_status keep(rm_arena *arena, const tracer *t, rm_trace *out)
   RM_NEW(crossing, arena, t->num_crossings);
   RM_NEW(offset, arena, (int64_t)t->states.num + 1);
   RM_NEW(winding, arena, num_winding);
-  RM_NEW(first, arena, t->own->num_edges);
-  for (int64_t e = 0, n = 0; e < t->own->num_edges; n += t->count[e++]) {
-    first[e] = n;
-    for (rm_lid k = 0; k < t->count[e]; k++) crossing[n + k] = t->crossing[t->first[e] + k];
-  }
+  if (t->num_crossings) memcpy(crossing, t->crossing, sizeof *crossing * (size_t)t->num_crossings);
   memcpy(offset, t->states.offset, sizeof *offset * ((size_t)t->states.num + 1));
   if (num_winding) memcpy(winding, t->states.winding, sizeof *winding * (size_t)num_winding);
-  *out = (rm_trace){t->num_crossings, crossing, first, t->count, t->state, offset, winding, t->states.num};
+  *out = (rm_trace){t->num_crossings, crossing, t->first, t->count, t->state, offset, winding, t->states.num};
   return REMAP_OK;
 }
 
 remap_status rm_trace_build(rm_arena *arena, const rm_trimesh *own, const rm_trimesh *other, int moved, bool by_tree,
                             const rm_progress *progress, rm_trace *out, rm_lid *bad_edge)
 {
-  tracer       t = {.own = own, .other = other, .moved = moved, .by_tree = by_tree, .scratch = rm_arena_new()};
+  tracer       t = {.own = own, .other = other, .moved = moved, .by_tree = by_tree, .scratch = rm_arena_new(),
+                    .clear = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
   remap_status status = t.scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status != REMAP_OK) goto done;
   RM_GOTO(done, status = rm_states_init(&t.states));
-  t.first = rm_arena_alloc(t.scratch, own->num_edges, sizeof *t.first);
+  t.first = rm_arena_alloc(arena, own->num_edges, sizeof *t.first);
   t.count = rm_arena_alloc(arena, own->num_edges, sizeof *t.count);
   t.state = rm_arena_alloc(arena, own->num_edges, sizeof *t.state);
   RM_GOTO(done, status = t.first && t.count && t.state ? REMAP_OK : REMAP_NO_MEMORY);

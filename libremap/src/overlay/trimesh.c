@@ -9,8 +9,9 @@
 #include <string.h>
 
 enum {
-  MAX_LOCAL_EDGES = 250, /* a cell with more is walked through by the box tree */
-  MAX_TRIANGLES   = 1 << 29
+  MAX_LOCAL_TRIANGLES = 166, /* a cell with more is walked through by the box tree */
+  MAX_LOCAL_VERTICES  = 256,
+  MAX_TRIANGLES       = 1 << 29
 };
 
 /* One triangle as a face of one cell, before joining. */
@@ -312,64 +313,46 @@ static remap_status triangles_of_cells(rm_arena *arena, rm_trimesh *m)
   return REMAP_OK;
 }
 
-/* The place of x in list[0..*n), appended if it is new; -1 if there is no room. */
-static int place_of(rm_lid x, rm_lid *list, int *n, int room)
-{
-  for (int k = 0; k < *n; k++)
-    if (list[k] == x) return k;
-  if (*n == room) return -1;
-  list[*n] = x;
-  return (*n)++;
-}
+/* Where a vertex was seen last. */
+typedef struct sighting {
+  rm_lid cell;
+  int    place;
+} sighting;
 
-static remap_status edges_of_cells(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+static remap_status vertices_of_cells(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
 {
   const int64_t num_sides = m->cell_triangle_offset[m->num_cells];
-  rm_lid       *edge_offset, *vertex_offset, *edge, *vertex, *edge_list, *vertex_list;
-  uint8_t     (*edge_end)[2], (*end_list)[2], (*triangle_edge)[3];
-  rm_lid        ne = 0, nv = 0;
+  rm_lid       *offset, *vertex, *list, n = 0;
+  uint8_t     (*corner)[3];
+  sighting     *at;
 
-  RM_NEW(edge_offset, arena, (int64_t)m->num_cells + 1);
-  RM_NEW(vertex_offset, arena, (int64_t)m->num_cells + 1);
-  RM_NEW(triangle_edge, arena, num_sides);
-  RM_NEW(edge_list, scratch, 3 * num_sides);
-  RM_NEW(vertex_list, scratch, 3 * num_sides);
-  RM_NEW(end_list, scratch, 3 * num_sides);
+  RM_NEW(offset, arena, (int64_t)m->num_cells + 1);
+  RM_NEW(corner, arena, num_sides);
+  RM_NEW(list, scratch, 3 * num_sides);
+  RM_NEW(at, scratch, m->num_vertices);
+  for (rm_lid v = 0; v < m->num_vertices; v++) at[v].cell = -1;
   for (rm_lid c = 0; c < m->num_cells; c++) {
-    rm_lid *own_edge = edge_list + ne, *own_vertex = vertex_list + nv;
-    int     n = 0, k = 0, fits = 1;
+    const rm_lid first = m->cell_triangle_offset[c], last = m->cell_triangle_offset[c + 1];
+    int          num   = 0;
 
-    edge_offset[c]   = ne;
-    vertex_offset[c] = nv;
-    for (rm_lid a = m->cell_triangle_offset[c]; fits && a < m->cell_triangle_offset[c + 1]; a++)
+    offset[c] = n;
+    for (rm_lid a = first; a < last && last - first <= MAX_LOCAL_TRIANGLES; a++)
       for (int h = 0; h < 3; h++) {
-        const rm_lid e = m->triangle_edge[m->cell_triangle[a] / 2][h];
-        const int before = n, at = place_of(e, own_edge, &n, MAX_LOCAL_EDGES);
-
-        if (!(fits = at >= 0)) break;
-        triangle_edge[a][h] = (uint8_t)at;
-        if (n == before) continue;
-        for (int g = 0; g < 2; g++) /* at most two new vertices per new edge of a connected surface: fewer than 256 */
-          end_list[ne + at][g] = (uint8_t)place_of(m->edge[e][g], own_vertex, &k, 2 * MAX_LOCAL_EDGES);
-        fits = k < 256;
-        if (!fits) break;
+        const rm_lid v = m->triangle[m->cell_triangle[a] / 2][h];
+        if (at[v].cell != c) {
+          at[v]           = (sighting){c, num};
+          list[n + num++] = v;
+        }
+        corner[a][h] = (uint8_t)at[v].place;
       }
-    if (fits) ne += n, nv += k;
+    if (num <= MAX_LOCAL_VERTICES) n += num;
   }
-  edge_offset[m->num_cells]   = ne;
-  vertex_offset[m->num_cells] = nv;
-  RM_NEW(edge, arena, ne);
-  RM_NEW(vertex, arena, nv);
-  RM_NEW(edge_end, arena, ne);
-  memcpy(edge, edge_list, sizeof *edge * (size_t)ne);
-  memcpy(vertex, vertex_list, sizeof *vertex * (size_t)nv);
-  memcpy(edge_end, end_list, sizeof *edge_end * (size_t)ne);
-  m->cell_edge_offset   = edge_offset;
-  m->cell_edge          = edge;
-  m->cell_edge_end      = (const uint8_t (*)[2])edge_end;
-  m->cell_vertex_offset = vertex_offset;
-  m->cell_vertex        = vertex;
-  m->cell_triangle_edge = (const uint8_t (*)[3])triangle_edge;
+  offset[m->num_cells] = n;
+  RM_NEW(vertex, arena, n);
+  memcpy(vertex, list, sizeof *vertex * (size_t)n);
+  m->cell_vertex_offset   = offset;
+  m->cell_vertex          = vertex;
+  m->cell_triangle_vertex = (const uint8_t (*)[3])corner;
   return REMAP_OK;
 }
 
@@ -566,7 +549,7 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
   RM_NEW(odd_box, scratch, m->num_cells);
   RM_TRY(pinched_vertices(scratch, m, pinched));
   for (rm_lid c = 0; c < m->num_cells; c++) {
-    const bool is_large = m->cell_edge_offset[c] == m->cell_edge_offset[c + 1];
+    const bool is_large = m->cell_vertex_offset[c] == m->cell_vertex_offset[c + 1];
     nearness   near = {m, c};
 
     for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++)
@@ -607,7 +590,7 @@ static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_tri
   RM_TRY(number_edges(arena, b->scratch, m));
   RM_TRY(edges_at_vertices(arena, m));
   RM_TRY(triangles_of_cells(arena, m));
-  RM_TRY(edges_of_cells(arena, b->scratch, m));
+  RM_TRY(vertices_of_cells(arena, b->scratch, m));
   RM_TRY(boxes(arena, m));
   RM_TRY(collect_skin(arena, m));
   return choose_walks(arena, b->scratch, m);

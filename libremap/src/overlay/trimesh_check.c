@@ -176,35 +176,24 @@ static bool cells_are_closed(const rm_trimesh *m, int *balance)
   return true;
 }
 
-/* The numbering of edges and vertices within cell c, if it has one. */
+/* The numbering of vertices within cell c, if it has one. */
 static bool local_numbers_are_right(const rm_trimesh *m, rm_lid c)
 {
-  const rm_lid first = m->cell_edge_offset[c], num_edges = m->cell_edge_offset[c + 1] - first;
-  const rm_lid first_vertex = m->cell_vertex_offset[c], num_vertices = m->cell_vertex_offset[c + 1] - first_vertex;
+  const rm_lid first = m->cell_vertex_offset[c], num = m->cell_vertex_offset[c + 1] - first;
   const rm_lid begin = m->cell_triangle_offset[c], end = m->cell_triangle_offset[c + 1];
 
-  if (num_edges < 0 || num_vertices < 0 || m->cell_walk[c] > RM_WALK_NOT) return false;
-  if (num_edges == 0) return num_vertices == 0 && m->cell_walk[c] == RM_WALK_NOT;
-  for (rm_lid v = 0; v < num_vertices; v++) {
+  if (num < 0 || m->cell_walk[c] > RM_WALK_NOT) return false;
+  if (num == 0) return m->cell_walk[c] == RM_WALK_NOT;
+  for (rm_lid v = 0; v < num; v++) {
     bool used = false;
-    for (rm_lid f = 0; f < num_edges && !used; f++)
-      used = m->cell_edge_end[first + f][0] == v || m->cell_edge_end[first + f][1] == v;
-    if (!used || holds(m->cell_vertex, first_vertex, first_vertex + v, m->cell_vertex[first_vertex + v])) return false;
-  }
-  for (rm_lid f = 0; f < num_edges; f++) {
-    bool used = false;
-    for (int h = 0; h < 2; h++) {
-      const int place = m->cell_edge_end[first + f][h];
-      if (place >= num_vertices || m->cell_vertex[first_vertex + place] != m->edge[m->cell_edge[first + f]][h]) return false;
-    }
     for (rm_lid a = begin; a < end && !used; a++)
-      for (int h = 0; h < 3; h++) used |= m->cell_triangle_edge[a][h] == f;
-    if (!used || holds(m->cell_edge, first, first + f, m->cell_edge[first + f])) return false;
+      for (int h = 0; h < 3; h++) used |= m->cell_triangle_vertex[a][h] == v;
+    if (!used || holds(m->cell_vertex, first, first + v, m->cell_vertex[first + v])) return false;
   }
   for (rm_lid a = begin; a < end; a++)
     for (int h = 0; h < 3; h++) {
-      const int place = m->cell_triangle_edge[a][h];
-      if (place >= num_edges || m->cell_edge[first + place] != m->triangle_edge[m->cell_triangle[a] / 2][h]) return false;
+      const int place = m->cell_triangle_vertex[a][h];
+      if (place >= num || m->cell_vertex[first + place] != m->triangle[m->cell_triangle[a] / 2][h]) return false;
     }
   return true;
 }
