@@ -68,18 +68,32 @@ static void close_world(world *w)
   for (int side = 0; side < 2; side++) tm_free(w->mine[side]), free(w->u[side]), free(w->mask[side]);
 }
 
+/* Step n of a motion: the source moves by a little. */
+static remap_status step(world *w, int n)
+{
+  const double       m[12]     = {1, 0, 0, .001 * n, 0, 1, 0, 0, 0, 0, 1, 0};
+  const remap_motion motion[2] = {{NULL, m}, {NULL, NULL}};
+
+  return remap_move(w->ctx, motion);
+}
+
+/* A build, and steps that leave something for the next one to keep. */
+static void prepare_move(world *w)
+{
+  RT_EQ(remap_build(w->ctx), REMAP_OK);
+  for (int n = 1; n <= 2; n++) RT_EQ(step(w, n), REMAP_OK);
+}
+
 /* Build, or move if moves is true; mask; transfer both ways. Stops where something fails, after an agreement. */
 static remap_status run(world *w, bool moves)
 {
-  static const double turned[12] = {1, 0, 0, .01, 0, 1, 0, 0, 0, 0, 1, 0};
-  const remap_motion  motion[2]  = {{NULL, turned}, {NULL, NULL}};
   const remap_masks   masks      = {.gives = {w->mask[0], NULL}, .wants = {NULL, w->mask[1]}};
   remap_transfer      how;
   remap_status        status;
 
   remap_transfer_default(&how);
   how.on_uncovered = REMAP_UNCOVERED_NEAREST;
-  status           = moves ? remap_move(w->ctx, motion) : remap_build(w->ctx);
+  status           = moves ? step(w, 3) : remap_build(w->ctx);
   if (status == REMAP_OK) status = remap_set_masks(w->ctx, &masks);
   for (int d = 0; d < 2 && status == REMAP_OK; d++) {
     const remap_field_desc f = {.nature = REMAP_CONSERVED, .in = w->u[d], .out = w->u[1 - d]};
@@ -107,11 +121,11 @@ static void exhaust(bool moves)
   bool  comes  = true;
   world w;
 
-  open_world(&w, 6); /* large enough for arrays with blocks of their own */
+  open_world(&w, moves ? 4 : 6); /* 6: large enough for arrays with blocks of their own */
   for (int n = 0; comes && n < 2000; n++) {
     remap_status status;
 
-    if (moves) RT_EQ(remap_build(w.ctx), REMAP_OK);
+    if (moves) prepare_move(&w);
     left   = is_last() ? n : -1;
     status = run(&w, moves);
     comes  = !rt_all(!is_last() || left >= 0);
@@ -136,7 +150,7 @@ static void cancelling_at_any_call_stops_all_ranks(void)
     int          failed = 0;
 
     for (int n = 0; status == REMAP_CANCELLED && n < 1000; n++) {
-      if (moves) RT_EQ(remap_build(w.ctx), REMAP_OK);
+      if (moves) prepare_move(&w);
       calls_left = is_last() ? n : -1;
       status     = run(&w, moves);
       calls_left = -1;

@@ -1,8 +1,44 @@
 /* remap_move against a fresh build of the meshes where they went: the same bits of pairs, coverage, statistics and fields, for
- * one mesh or both, by coordinates or by a matrix; and what it refuses. */
+ * one mesh or both, by coordinates or by a matrix, for steps so small that much is kept and for jumps; what it refuses; and that
+ * memory does not grow. */
 #include <remap/remap.h>
+#include <malloc.h>
 #include "meshes.h"
 #include "rt.h"
+
+/* ---- memory that the library holds: counted by the linker's --wrap -------------------------------------------------------- */
+
+static int64_t held;
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__real_realloc(void *old, size_t size);
+void *__real_aligned_alloc(size_t alignment, size_t size);
+void  __real_free(void *block);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t n, size_t size);
+void *__wrap_realloc(void *old, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+void  __wrap_free(void *block);
+static void *counted(void *block)
+{
+  held += block ? (int64_t)malloc_usable_size(block) : 0;
+  return block;
+}
+void *__wrap_malloc(size_t size) { return counted(__real_malloc(size)); }
+void *__wrap_calloc(size_t n, size_t size) { return counted(__real_calloc(n, size)); }
+void *__wrap_realloc(void *old, size_t size)
+{
+  held -= old ? (int64_t)malloc_usable_size(old) : 0;
+  return counted(__real_realloc(old, size));
+}
+void *__wrap_aligned_alloc(size_t alignment, size_t size) { return counted(__real_aligned_alloc(alignment, size)); }
+void  __wrap_free(void *block)
+{
+  held -= block ? (int64_t)malloc_usable_size(block) : 0;
+  __real_free(block);
+}
+
+/* ------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct world {
   remap_context *ctx;
@@ -40,23 +76,46 @@ static void draw(uint64_t *state, bool far, double m[12])
   for (int r = 0; r < 3; r++) m[4 * r + 3] = .001 * (double)tm_random(state, 200) + (far ? 3 * r : 0);
 }
 
-static void open_world(world *w, const double (*where)[12], uint64_t seed)
+/* The coordinates of a side's nodes, moved. */
+static double *put_all(const world *w, int side, const double m[12])
+{
+  const int64_t n   = w->mine[side]->view.num_nodes;
+  double       *xyz = tm_alloc_(3 * n, sizeof *xyz);
+
+  put(xyz, w->mine[side]->xyz, n, m);
+  return xyz;
+}
+
+/* Hand these coordinates of a side to a context that is new. */
+static void lend(world *w, int side, double *xyz)
+{
+  free(w->mine[side]->xyz);
+  w->mine[side]->view.node_xyz = w->mine[side]->xyz = xyz;
+}
+
+/* A world whose meshes are set but not built. */
+static void start_world(world *w, uint64_t seed)
 {
   RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &w->ctx), REMAP_OK);
   for (int side = 0; side < 2; side++) {
     tm_mesh *whole = make(side);
     int     *deal  = tm_deal(whole, rt_size(), TM_RANDOM, seed);
     w->mine[side]  = tm_part(whole, deal, rt_rank(), seed);
-    if (where) {
-      double *xyz = tm_alloc_(3 * w->mine[side]->view.num_nodes, sizeof *xyz);
-      put(xyz, w->mine[side]->xyz, w->mine[side]->view.num_nodes, where[side]);
-      free(w->mine[side]->xyz);
-      w->mine[side]->view.node_xyz = w->mine[side]->xyz = xyz;
-    }
-    RT_EQ(remap_set_mesh(w->ctx, side, &w->mine[side]->view), REMAP_OK);
     tm_free(whole), free(deal);
   }
+}
+
+static void build_world(world *w)
+{
+  for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(w->ctx, side, &w->mine[side]->view), REMAP_OK);
   RT_EQ(remap_build(w->ctx), REMAP_OK);
+}
+
+static void open_world(world *w, const double (*where)[12], uint64_t seed)
+{
+  start_world(w, seed);
+  for (int side = 0; side < 2 && where; side++) lend(w, side, put_all(w, side, where[side]));
+  build_world(w);
 }
 
 static void close_world(world *w)
@@ -143,6 +202,108 @@ static void a_move_makes_the_bits_of_a_fresh_build(void)
   }
 }
 
+/* A zone turns by a tenth of a cell each time, now and then by more: what is kept holds for some steps and then does not. */
+static void many_small_steps_make_the_bits_of_fresh_builds(void)
+{
+  double where[2][12] = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+  world  w;
+
+  open_world(&w, NULL, 11);
+  for (int step = 1; step <= 32; step++) {
+    const int          side      = step < 24; /* first the target moves alone, then the source */
+    const double       angle     = .02 * step + (step % 9 == 0 ? .1 : 0), c = cos(angle), s = sin(angle);
+    const remap_motion motion[2] = {{NULL, side ? NULL : where[0]}, {NULL, side ? where[1] : NULL}};
+    world              fresh;
+
+    memcpy(where[side], (const double[12]){c, -s, 0, .5 - .5 * c + .5 * s, s, c, 0, .5 - .5 * s - .5 * c, 0, 0, 1, .005 * step}, sizeof where[side]);
+    RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+    if (step % 3 == 1) continue;
+    open_world(&fresh, (const double(*)[12])where, 11);
+    compare(&w, &fresh);
+    close_world(&fresh);
+  }
+  close_world(&w);
+}
+
+/* Every node by a lot of its own, drawn from its coordinates, so that its copies stay together: faces bend, other diagonals and
+ * other triangles are chosen for them, cells turn inside out. */
+static double *shaken(const world *w, int side, uint64_t seed, double by)
+{
+  const int64_t n   = w->mine[side]->view.num_nodes;
+  double       *xyz = tm_alloc_(3 * n, sizeof *xyz);
+
+  for (int64_t i = 0; i < n; i++) {
+    uint64_t state = seed;
+
+    for (int k = 0; k < 3; k++) {
+      uint64_t bits;
+      memcpy(&bits, &w->mine[side]->xyz[3 * i + k], sizeof bits);
+      state = tm_mix_(state ^ bits);
+    }
+    for (int k = 0; k < 3; k++) xyz[3 * i + k] = w->mine[side]->xyz[3 * i + k] + by * ((double)tm_random(&state, 2001) / 1000 - 1);
+  }
+  return xyz;
+}
+
+static void nodes_that_move_apart_make_the_bits_of_a_fresh_build(void)
+{
+  static const double by[] = {1e-3, 2e-3, 1e-3, .3, 5e-2, .2, 1e-3};
+  double             *xyz[2] = {NULL, NULL};
+  world               w;
+
+  open_world(&w, NULL, 13);
+  for (int step = 0; step < 7; step++) {
+    remap_motion  motion[2] = {{NULL, NULL}, {NULL, NULL}};
+    const double *list[2];
+    world         fresh;
+
+    start_world(&fresh, 13);
+    for (int side = 0; side < 2; side++) {
+      if (step % 3 != side) {
+        free(xyz[side]);
+        xyz[side]             = shaken(&w, side, (uint64_t)(100 * side + step), by[step]);
+        list[side]            = xyz[side];
+        motion[side].node_xyz = &list[side];
+      }
+      if (!xyz[side]) continue;
+      double *copy = tm_alloc_(3 * w.mine[side]->view.num_nodes, sizeof *copy);
+      memcpy(copy, xyz[side], (size_t)(3 * w.mine[side]->view.num_nodes) * sizeof *copy);
+      lend(&fresh, side, copy);
+    }
+    build_world(&fresh);
+    RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+    compare(&w, &fresh);
+    close_world(&fresh);
+  }
+  close_world(&w);
+  for (int side = 0; side < 2; side++) free(xyz[side]);
+}
+
+static void a_thousand_moves_hold_no_more_memory_than_sixty(void)
+{
+  const int num = rt_size() == 1 ? 1000 : 80;
+  int64_t   most = 0;
+  int       grown = 0;
+  world     w;
+
+  open_world(&w, NULL, 17);
+  double *u = tm_alloc_(w.mine[0]->view.num_cells, sizeof *u), *v = tm_alloc_(w.mine[1]->view.num_cells, sizeof *v);
+  for (int step = 0; step < num; step++) {
+    const double           angle = .3 * sin(.1 * M_PI * (step % 20)), c = cos(angle), s = sin(angle);
+    const double           m[12] = {c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0};
+    const remap_motion     motion[2] = {{NULL, NULL}, {NULL, m}};
+    const remap_field_desc f         = {.nature = REMAP_CONSERVED, .has_old = 1, .in = u, .out = v};
+
+    RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
+    if (step % 10 == 0) RT_EQ(remap_field(w.ctx, REMAP_FORWARD, NULL, 1, &f, NULL), REMAP_OK);
+    if (step < 60) most = held > most ? held : most; /* three times to and fro */
+    else if (held > most) grown++;
+  }
+  RT_EQ(grown, 0);
+  free(u), free(v);
+  close_world(&w);
+}
+
 static void moves_are_refused_before_a_build_and_after_a_mesh_is_set(void)
 {
   static const double turned[12] = {1, 0, 0, .01, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -184,5 +345,7 @@ static void a_move_to_nowhere_fails_on_every_rank_and_a_build_mends_it(void)
   free(xyz);
 }
 
-RT_MAIN(RT_CASE(a_move_makes_the_bits_of_a_fresh_build), RT_CASE(moves_are_refused_before_a_build_and_after_a_mesh_is_set),
+RT_MAIN(RT_CASE(a_move_makes_the_bits_of_a_fresh_build), RT_CASE(many_small_steps_make_the_bits_of_fresh_builds),
+        RT_CASE(nodes_that_move_apart_make_the_bits_of_a_fresh_build), RT_CASE(a_thousand_moves_hold_no_more_memory_than_sixty),
+        RT_CASE(moves_are_refused_before_a_build_and_after_a_mesh_is_set),
         RT_CASE(a_move_to_nowhere_fails_on_every_rank_and_a_build_mends_it))

@@ -304,7 +304,8 @@ REMAP_API remap_status remap_build(remap_context *ctx);
  *  bit, as that of a remap_build with the moved coordinates; a mesh that stays is not read again. Whoever calls this keeps
  *  what remap_set_mesh and the last motion lent, unchanged, until the next remap_build or remap_destroy. A matrix is
  *  applied to the lent coordinates each time anew, so that motions do not add up. Masks end. If it fails, remap_build comes
- *  next.
+ *  next. From one move to the next the context keeps where cells are overlaid and the triangles of a mesh that stays, which
+ *  small motions use again; remap_build gives that memory back.
  *  Errors: those of remap_build; BAD_ORDER (no overlay, a mesh set since, or a transfer under way), BAD_ARGUMENT. */
 REMAP_API remap_status remap_move(remap_context *ctx, const remap_motion motion[2]);
 

@@ -27,20 +27,21 @@ static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
 }
 
 /* What happens on this rank alone. */
-static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const rm_part *part, const double magnitude[2],
+static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const double magnitude[2],
                                  const rm_overlay **overlay, const rm_moments **moments, rm_zone_overlap zones[2],
                                  rm_reason *reason)
 {
   const rm_progress progress = {ctx->options.progress, ctx->options.user};
-  const rm_trimesh *mesh[2];
+  const rm_part    *part     = &ctx->place.part;
 
   for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_trimesh_build(arena, &ctx->frame, &part->piece[side], ctx->options.faces, &mesh[side]));
-    RM_TRY(rm_zone_overlap_find(&ctx->frame, &part->piece[side], mesh[side], ctx->options.faces, ctx->labels[side].num_zones,
-                                ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side], reason));
+    RM_TRY(rm_context_triangulate(ctx, side));
+    RM_TRY(rm_zone_overlap_find(&ctx->frame, &part->piece[side], ctx->place.trimesh[side], ctx->options.faces,
+                                ctx->labels[side].num_zones, ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side],
+                                reason));
   }
   RM_TRY(rm_context_progress(ctx, "triangulation", 1));
-  RM_TRY(rm_overlay_build(arena, mesh, part, &progress, overlay, reason));
+  RM_TRY(rm_overlay_build(arena, ctx->place.trimesh, part, &progress, overlay, reason));
   RM_TRY(rm_moments_build(arena, part, *overlay, ctx->options.max_order > 2 ? 2 : 1, moments));
   return rm_context_progress(ctx, "volumes and moments", 1);
 }
@@ -105,29 +106,27 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
 /* The overlay of meshes that move or are new, which are read again, and of others, which are as they were. Collective. */
 static remap_status build(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason)
 {
-  const rm_zone    *zone;
-  const rm_part    *part;
   const rm_overlay *overlay = NULL;
   const rm_moments *moments = NULL;
   rm_zone_overlap   zones[2];
+  bool              is_new[2] = {moves[0], moves[1]};
   double            start = rm_seconds(), magnitude[2];
 
-  RM_TRY(rm_context_read_meshes(ctx, moves, passing, reason));
-  RM_TRY(rm_zone_build(passing, &ctx->comm, ctx->mesh, &zone));
-  RM_TRY(rm_part_build(passing, &ctx->comm, &ctx->frame, ctx->mesh, zone, &part, reason));
+  RM_TRY(rm_context_read_meshes(ctx, is_new, passing, reason));
+  RM_TRY(rm_context_place(ctx, is_new, passing, reason));
   RM_TRY(find_magnitudes(ctx, magnitude));
   ctx->stats.seconds_partition = rm_seconds() - start;
   start                        = rm_seconds();
-  RM_TRY(stage(ctx, overlay_here(ctx, passing, part, magnitude, &overlay, &moments, zones, reason), reason));
+  RM_TRY(stage(ctx, overlay_here(ctx, passing, magnitude, &overlay, &moments, zones, reason), reason));
   RM_TRY(worst_zone_overlap(ctx, zones, reason));
   const int64_t crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
-  RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, part, moments, &ctx->mapping, reason));
+  RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->place.part, moments, &ctx->mapping, reason));
   ctx->stats.seconds_overlay = rm_seconds() - start;
   return fill_stats(ctx, crossings);
 }
 
-/* Drop what rests on the last overlay and make a new one. Collective. */
-static remap_status build_anew(remap_context *ctx, const bool moves[2], rm_reason *reason)
+/* Drop what rests on the last overlay and make a new one. keeps: the next one may use what this one can. Collective. */
+static remap_status build_anew(remap_context *ctx, const bool moves[2], bool keeps, rm_reason *reason)
 {
   rm_arena    *passing = rm_arena_new();
   remap_status status;
@@ -144,6 +143,7 @@ static remap_status build_anew(remap_context *ctx, const bool moves[2], rm_reaso
   if (status == REMAP_OK) status = build(ctx, moves, passing, reason);
   rm_arena_drop(passing);
   ctx->is_built = status == REMAP_OK;
+  if (!ctx->is_built || !keeps) rm_context_drop_place(ctx);
   for (int d = 0; d < 2; d++) ctx->masked[d] = ctx->mapping;
   return status;
 }
@@ -161,7 +161,8 @@ remap_status remap_build(remap_context *ctx)
   status = stage(ctx, status, &reason);
   if (status == REMAP_OK) {
     for (int side = 0; side < 2; side++) ctx->is_turned[side] = false;
-    status = build_anew(ctx, both, &reason);
+    rm_context_drop_place(ctx);
+    status = build_anew(ctx, both, false, &reason);
   }
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;
@@ -197,7 +198,7 @@ remap_status remap_move(remap_context *ctx, const remap_motion motion[2])
 
     for (int side = 0; side < 2; side++) any[side] = take_motion(ctx, side, &motion[side]);
     status = rm_comm_max_i64(&ctx->comm, any, 2);
-    if (status == REMAP_OK) status = build_anew(ctx, (const bool[2]){any[0] != 0, any[1] != 0}, &reason);
+    if (status == REMAP_OK) status = build_anew(ctx, (const bool[2]){any[0] != 0, any[1] != 0}, true, &reason);
   }
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;

@@ -3,6 +3,7 @@
 #define RM_CONTEXT_H
 
 #include "field/field.h"
+#include "overlay/overlay.h"
 
 /* Names of one mesh, copied so that messages can use them after the caller's arrays are gone. */
 typedef struct rm_labels {
@@ -11,6 +12,19 @@ typedef struct rm_labels {
   const char *const *zone;             /* [num_zones]     */
   const int64_t     *zone_cell_offset; /* [num_zones + 1] */
 } rm_labels;
+
+/* Where the cells of both meshes are overlaid. */
+typedef struct rm_place {
+  rm_arena         *arena;          /* of routes and boxes                                               */
+  rm_arena         *piece_arena[2]; /* [side] of the piece and its triangles                             */
+  const rm_routes  *routes;         /* NULL: none are chosen                                             */
+  rm_part           part;           /* what came along them                                              */
+  const rm_trimesh *trimesh[2];     /* [side] of the piece; NULL until made                              */
+  rm_frame          frame;          /* that the triangles are for                                        */
+  const double    (*box[2])[6];     /* [side][cells of this rank] as they were when routes were chosen   */
+  double            margin;         /* by which cells may come nearer to each other while routes hold    */
+  int               num_moves;      /* since routes were chosen                                          */
+} rm_place;
 
 struct remap_context {
   rm_comm       comm;
@@ -37,6 +51,7 @@ struct remap_context {
   const rm_stencil *wide[2];          /* [side] likewise, for order 3                */
   const double    (*second[2])[6];    /* [side] likewise, rm_mesh_second             */
 
+  rm_place          place; /* kept between moves, empty otherwise */
   rm_arena         *arena; /* of the mapping and its views, dropped by the next overlay */
   const rm_mapping *mapping;
   remap_pairs_view  view[2]; /* made when first needed; row_offset NULL until then */
@@ -59,8 +74,19 @@ void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason
 remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side, int num_blocks, const remap_mesh *block,
                                     remap_mesh *out, rm_layout *layout, rm_reason *reason);
 
-/* Read the meshes that move, keep the other one as it is where that is possible. Collective. What is not kept lives in passing. */
-remap_status rm_context_read_meshes(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason);
+/* Read the meshes that are new, keep the other one as it is where that is possible; is_new becomes true for what was read after all.
+ * Collective. What is not kept lives in passing. */
+remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena *passing, rm_reason *reason);
+
+/* Bring the cells of both meshes to where they are overlaid, unless they are there already: is_new[side], the mesh is not as it was
+ * at the last call. Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena *passing, rm_reason *reason);
+
+/* Triangulate what is there of one side, unless that is done already. Not collective. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_triangulate(remap_context *ctx, int side);
+
+/* Forget where cells are overlaid. Not collective. */
+void rm_context_drop_place(remap_context *ctx);
 
 /* Forget meshes and their stencils. Not collective. */
 void rm_context_drop_meshes(remap_context *ctx);

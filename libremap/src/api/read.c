@@ -119,17 +119,16 @@ static remap_status find_frame(remap_context *ctx, bool is_read[2], rm_arena *pa
   return REMAP_OK;
 }
 
-remap_status rm_context_read_meshes(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason)
+remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena *passing, rm_reason *reason)
 {
-  bool       is_read[2] = {moves[0], moves[1]};
   remap_mesh given[2];
 
-  RM_TRY(find_frame(ctx, is_read, passing, given, reason));
+  RM_TRY(find_frame(ctx, is_new, passing, given, reason));
   const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit; /* the same on all ranks */
   if (!isnormal(cubed) || !isnormal(cubed * unit * unit))
     return rm_fail(REMAP_BAD_MESH, reason, -1, -1, "the largest coordinate is about %.1g: volumes and moments are no doubles in this unit", unit);
   for (int side = 0; side < 2; side++) {
-    if (is_read[side])
+    if (is_new[side])
       RM_TRY(rm_mesh_build(ctx->mesh_arena[side], &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side],
                            reason));
     RM_TRY(rm_comm_agree_reason(&ctx->comm, rm_context_progress(ctx, "checking of meshes", 0.5 * (side + 1)), reason));

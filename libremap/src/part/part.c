@@ -1,28 +1,56 @@
-/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What shipping
- * one mesh needs on the way is dropped before the other ships, so memory peaks at the product, the keys and boxes of the zone,
- * and what one mesh sends and receives. */
+/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What a stage needs
+ * on the way is dropped before the next, so memory peaks at the product, the routes, and the keys and boxes of the zone or what
+ * one mesh sends and receives. */
 #include "part/part_private.h"
 
-/* Where the cells of both meshes go. Collective. */
-static remap_status plan_routes(rm_arena *scratch, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
-                                const rm_zone *zone, rm_route route[2], rm_reason *reason)
+/* A route without what was needed on the way to it. */
+static remap_status copy_route(rm_arena *arena, int num_ranks, const rm_route *route, rm_route *out)
 {
-  rm_frame zone_frame;
+  RM_NEW(out->offset, arena, (int64_t)num_ranks + 1);
+  RM_NEW(out->cell, arena, route->offset[num_ranks]);
+  for (int r = 0; r <= num_ranks; r++) out->offset[r] = route->offset[r];
+  for (int64_t k = 0; k < route->offset[num_ranks]; k++) out->cell[k] = route->cell[k];
+  return REMAP_OK;
+}
+
+static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
+                         const rm_mesh *const mesh[2], const rm_zone *zone, rm_routes *out, rm_reason *reason)
+{
+  rm_frame     zone_frame;
+  rm_route     route[2];
+  remap_status mine = REMAP_OK;
 
   RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
   RM_TRY(rm_part_cut(scratch, comm, &zone_frame, mesh, zone, &route[REMAP_TARGET]));
-  return rm_part_match(scratch, comm, mesh, zone, &route[REMAP_TARGET], &route[REMAP_SOURCE], reason);
+  RM_TRY(rm_part_match(scratch, comm, mesh, zone, &route[REMAP_TARGET], &route[REMAP_SOURCE], reason));
+  for (int side = 0; side < 2 && mine == REMAP_OK; side++) mine = copy_route(arena, comm->size, &route[side], &out->of[side]);
+  return rm_comm_agree(comm, mine, NULL);
 }
 
-/* Ship one mesh with working memory of its own. Collective. */
-static remap_status ship(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route, rm_piece *piece,
-                         rm_reason *reason)
+remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                          const rm_zone *zone, const rm_routes **out, rm_reason *reason)
+{
+  rm_arena    *scratch = rm_arena_new();
+  rm_routes   *routes  = rm_arena_alloc(arena, 1, sizeof *routes);
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch && routes ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(scratch && routes);
+  RM_GOTO(done, status = plan(arena, scratch, comm, frame, mesh, zone, routes, reason));
+  *out = routes;
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
+                          rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new();
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh, route, piece, reason));
+  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh, &routes->of[mesh->side], out, reason));
 done:
   rm_arena_drop(scratch);
   return status;
@@ -31,21 +59,16 @@ done:
 remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, const rm_part **out, rm_reason *reason)
 {
-  rm_arena    *scratch = rm_arena_new();
-  rm_part     *part    = rm_arena_alloc(arena, 1, sizeof *part);
-  rm_route     route[2];
-  remap_status status;
+  rm_part         *part   = rm_arena_alloc(arena, 1, sizeof *part);
+  const rm_routes *routes = NULL;
 
-  RM_GOTO(done, status = rm_comm_agree(comm, scratch && part ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(scratch && part);
-  RM_GOTO(done, status = plan_routes(scratch, comm, frame, mesh, zone, route, reason));
-  for (int side = 0; side < 2; side++)
-    RM_GOTO(done, status = ship(arena, comm, mesh[side], &route[side], &part->piece[side], reason));
+  RM_TRY(rm_comm_agree(comm, part ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(part);
+  RM_TRY(rm_part_plan(arena, comm, frame, mesh, zone, &routes, reason));
+  for (int side = 0; side < 2; side++) RM_TRY(rm_part_send(arena, comm, mesh[side], routes, &part->piece[side], reason));
   RM_ASSERT(rm_part_check(part) != REMAP_INTERNAL);
   *out = part;
-done:
-  rm_arena_drop(scratch);
-  return status;
+  return REMAP_OK;
 }
 
 /* Every number is in its range, a skin face has one cell, and cells ascend by sender and the sender's numbering. */

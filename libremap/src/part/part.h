@@ -28,8 +28,20 @@ typedef struct rm_part {
   rm_piece piece[2]; /* [side] */
 } rm_part;
 
-/* Collective. Lives in arena. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let
- * results depend on it. TOO_LARGE if a piece has 2^31 or more entities. */
+/* Which cells go where. Opaque; read-only once made. */
+typedef struct rm_routes rm_routes;
+
+/* Choose where the cells of the zone go. Collective. Lives in arena. TOO_LARGE as below. */
+remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                          const rm_zone *zone, const rm_routes **out, rm_reason *reason);
+
+/* Send the cells of one mesh there. Collective. The routes may have been made for the same cells in another position. *out lives in
+ * arena. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let results depend on it.
+ * TOO_LARGE if the piece has 2^31 or more entities. */
+remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
+                          rm_reason *reason);
+
+/* Both in one, for both meshes. Collective. Lives in arena. */
 remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, const rm_part **out, rm_reason *reason);
 /* Every invariant above; slow. Not collective. */

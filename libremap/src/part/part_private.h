@@ -11,6 +11,10 @@ typedef struct rm_route {
   rm_lid  *cell;   /* [offset[comm->size]] grouped by destination, then ascending  */
 } rm_route;
 
+struct rm_routes {
+  rm_route of[2]; /* [side] */
+};
+
 /* The frame with its box narrowed to the zone's cells, all ranks: Morton keys then resolve the zone and not what lies around
  * it. Collective. */
 remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], const rm_zone *zone,
