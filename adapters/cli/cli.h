@@ -4,6 +4,7 @@
  *   fields.c    which fields take part, and their values
  *   masks.c     which cells give and which want values
  *   coverage.c  how much of the cells is covered
+ *   check.c     --check
  *   job.c       what these share
  *   options.c   the command line
  *   report.c    text for people, JSON for programs
@@ -14,13 +15,13 @@
 #define REMAP_CLI_H
 
 /** Every exit status: name, number, text for --help. The greater one wins when ranks differ. */
-#define CLI_EXIT_LIST(X)                                                                                            \
-  X(DONE, 0, "done")                                                                                                \
-  X(USAGE, 2, "usage")                                                                                              \
-  X(COVERAGE, 3, "cells are not covered as --on-uncovered or --on-partial demand")                                  \
-  X(VERIFY, 4, "verification failed: closure above 1e-10 or conservation error above 1e-12; OUTPUT is not written") \
-  X(IO, 5, "input or output")                                                                                       \
-  X(GEOMETRY, 6, "a mesh is broken, or its zones overlap")                                                          \
+#define CLI_EXIT_LIST(X)                                                                                        \
+  X(DONE, 0, "done")                                                                                            \
+  X(USAGE, 2, "usage")                                                                                          \
+  X(COVERAGE, 3, "cells are not covered as --on-uncovered or --on-partial demand")                              \
+  X(VERIFY, 4, "verification or --check failed: closure above 1e-10, conservation above 1e-12, ...; no OUTPUT") \
+  X(IO, 5, "input or output")                                                                                   \
+  X(GEOMETRY, 6, "a mesh is broken, or its zones overlap")                                                      \
   X(INTERNAL, 7, "memory, MPI or an internal check")
 
 typedef enum cli_exit {

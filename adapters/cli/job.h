@@ -25,6 +25,7 @@ typedef struct cli_job {
   rcgns_solution solution[2];
   remap_context *ctx;
 
+  double           *fraction[2]; /**< [remap_side][cells of this rank] of their volume that is covered: psi and phi */
   int               num_fields;
   remap_field_desc *field;   /**< [num_fields] names, natures and where the values are */
   cli_field_row    *row;     /**< [num_fields] the same fields in the report */
@@ -64,19 +65,24 @@ bool cli_is_mask(const cli_options *options, const char *field);
  *  no known codes, no cell takes part), IO, INTERNAL. */
 cli_exit cli_masks_read(cli_job *j, cli_failure *why);
 
-/** Give the library the masks, after remap_build. Collective. Errors: GEOMETRY (cells that give overlap), INTERNAL. */
+/** Give the library the masks, after remap_build. Collective. Errors: INTERNAL. */
 cli_exit cli_masks_apply(cli_job *j, cli_failure *why);
+
+/** How much of the cells is covered, after the masks: fills fraction and the coverage of the report. Collective.
+ *  Errors: INTERNAL. */
+cli_exit cli_coverage_find(cli_job *j, cli_failure *why);
+
+/** After that: refuse masks that leave zones of SOURCE overlapping, and let what is covered too little count as uncovered.
+ *  Collective. Errors: GEOMETRY, INTERNAL. */
+cli_exit cli_masks_settle(cli_job *j, cli_failure *why);
 
 /** Give the cells of TARGET that want nothing and have no old values the state of the first cell that wants: holes must hold
  *  something that a solver can read. With --on-uncovered fill=VALUE they get that. Collective. */
 void cli_masks_fill(cli_job *j);
 
-/** How much of the cells is covered, for the report. Collective. Errors: INTERNAL. */
-cli_exit cli_coverage_find(cli_job *j, cli_failure *why);
-
-/** The fraction of each cell of one side on this rank that the other side covers; *fraction is the caller's (free). Collective.
- *  Errors: INTERNAL. */
-cli_exit cli_coverage_fractions(cli_job *j, remap_side side, double **fraction, cli_failure *why);
+/** remap --check: transfer known fields, put the figures into the report and, unless quiet, print them. After the masks.
+ *  Collective. Errors: VERIFY (a figure fails), COVERAGE (the meshes do not meet), INTERNAL. */
+cli_exit cli_check(cli_job *j, cli_failure *why);
 
 /** A status of the library as an exit status; its message becomes ours, with the files' names where it has none. Not
  *  collective. */

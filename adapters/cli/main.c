@@ -102,10 +102,10 @@ static cli_exit check_outputs(cli_job *j, cli_failure *why)
   const cli_options *options    = &j->options;
   const char        *psi        = options->source_coverage;
   const char *const  others[4]  = {options->path[REMAP_SOURCE], options->path[REMAP_TARGET], options->output, psi};
-  const int          num_others = psi ? 4 : 3;
+  const int          num_others = psi ? 4 : options->output ? 3 : 2;
   cli_exit           mine       = CLI_DONE;
 
-  CLI_TRY(check_new_file(j, options->output, why));
+  if (options->output) CLI_TRY(check_new_file(j, options->output, why));
   if (psi) CLI_TRY(check_new_file(j, psi, why));
   if (psi && j->rank == 0 && cli_is_same_file(psi, options->output))
     mine = cli_fail(why, CLI_USAGE, "%s: it is used already: give --source-coverage another file", psi);
@@ -148,7 +148,7 @@ static cli_exit build(cli_job *j, cli_failure *why)
   cli_progress_set(j->progress, "overlay", -1);
   remap_options_default(&options);
   options.faces                 = j->options.faces;
-  options.max_order             = j->options.transfer.order;
+  options.max_order             = j->options.check && j->options.transfer.order < 2 ? 2 : j->options.transfer.order;
   options.zone_overlap_is_error = !j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET]; /* which tell zones apart */
   options.log                   = j->options.verbose && !j->options.quiet ? print_log : NULL;
   options.progress              = hear_progress;
@@ -160,7 +160,8 @@ static cli_exit build(cli_job *j, cli_failure *why)
   CLI_TRY(cli_from_remap(j, remap_build(j->ctx), why));
   CLI_TRY(cli_from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why));
   CLI_TRY(cli_masks_apply(j, why));
-  return cli_coverage_find(j, why);
+  CLI_TRY(cli_coverage_find(j, why));
+  return cli_masks_settle(j, why);
 }
 
 static cli_exit transfer(cli_job *j, cli_failure *why)
@@ -215,24 +216,21 @@ static cli_exit verify(const cli_job *j, cli_failure *why)
 /* The fields and, with --coverage, phi. Collective. */
 static cli_exit write_target(cli_job *j, cli_failure *why)
 {
-  const cli_options *options  = &j->options;
-  rcgns_new_field   *fields   = calloc((size_t)j->num_fields + 1, sizeof *fields);
-  double            *fraction = NULL;
-  cli_exit           mine     = cli_agree(j, fields ? CLI_DONE : cli_no_memory(why), why);
+  const cli_options *options = &j->options;
+  rcgns_new_field   *fields  = calloc((size_t)j->num_fields + 1, sizeof *fields);
+  cli_exit           mine    = cli_agree(j, fields ? CLI_DONE : cli_no_memory(why), why);
   rcgns_message      message;
 
   for (int k = 0; mine == CLI_DONE && k < j->num_fields; k++)
     fields[k] = (rcgns_new_field){.name = j->field[k].name, .values = j->field[k].out};
-  if (mine == CLI_DONE && options->coverage) mine = cli_coverage_fractions(j, REMAP_TARGET, &fraction, why);
   if (mine == CLI_DONE) {
     const char  *solution = j->report.solution[REMAP_TARGET];
     rcgns_status status;
 
-    fields[j->num_fields] = (rcgns_new_field){.name = CLI_COVERAGE_FIELD, .values = fraction};
+    fields[j->num_fields] = (rcgns_new_field){.name = CLI_COVERAGE_FIELD, .values = j->fraction[REMAP_TARGET]};
     status = rcgns_write(j->file[REMAP_TARGET], options->output, solution, j->num_fields + options->coverage, fields, &message);
     mine   = cli_from_cgns(status, &message, why);
   }
-  free(fraction);
   free(fields);
   if (mine == CLI_DONE) j->report.output = options->output;
   return mine;
@@ -242,16 +240,12 @@ static cli_exit write_target(cli_job *j, cli_failure *why)
 static cli_exit write_source(cli_job *j, cli_failure *why)
 {
   const char     *path = j->options.source_coverage;
-  double         *fraction;
-  rcgns_new_field psi = {.name = CLI_COVERAGE_FIELD};
+  rcgns_new_field psi  = {.name = CLI_COVERAGE_FIELD, .values = j->fraction[REMAP_SOURCE]};
   rcgns_message   message;
   cli_exit        mine;
 
-  CLI_TRY(cli_coverage_fractions(j, REMAP_SOURCE, &fraction, why));
-  psi.values = fraction;
   mine = cli_from_cgns(rcgns_write(j->file[REMAP_SOURCE], path, j->report.solution[REMAP_SOURCE], 1, &psi, &message), &message,
                        why);
-  free(fraction);
   if (mine == CLI_DONE) j->report.source_coverage = path;
   return mine;
 }
@@ -284,13 +278,23 @@ static cli_exit finish_report(cli_job *j, cli_failure *why)
   return cli_agree(j, mine, why);
 }
 
+/* After a verification that failed the numbers are worth reading all the same. Collective. */
+static cli_exit report_even_if(cli_job *j, cli_exit status, cli_failure *why)
+{
+  cli_failure lesser;
+
+  if (status == CLI_DONE) return finish_report(j, why);
+  if (status == CLI_VERIFY) (void)finish_report(j, &lesser);
+  return status;
+}
+
 static cli_exit run(cli_job *j, cli_failure *why)
 {
   const bool speaks = j->rank == 0 && !j->options.quiet;
   cli_exit   verified;
 
   CLI_TRY(open_files(j, why));
-  CLI_TRY(cli_fields_read(j, why));
+  if (!j->options.check) CLI_TRY(cli_fields_read(j, why));
   CLI_TRY(cli_masks_read(j, why));
   j->report.seconds_read = slowest(j, j->begin);
   MPI_Comm_size(j->comm, &j->report.stats.ranks);
@@ -298,15 +302,13 @@ static cli_exit run(cli_job *j, cli_failure *why)
   CLI_TRY(build(j, why));
   if (speaks) cli_report_overlap(stdout, &j->report);
   if (speaks) cli_report_cover(stdout, &j->report);
+  if (j->options.check) verified = verify(j, why);
+  if (j->options.check && verified == CLI_DONE) verified = cli_check(j, why);
+  if (j->options.check) return report_even_if(j, verified, why);
   CLI_TRY(transfer(j, why));
   if (speaks) cli_report_fields(stdout, &j->report);
   verified = verify(j, why);
-  if (verified != CLI_DONE) {
-    cli_failure lesser;
-
-    (void)finish_report(j, &lesser); /* the numbers are worth reading all the same */
-    return verified;
-  }
+  if (verified != CLI_DONE) return report_even_if(j, verified, why);
   CLI_TRY(write_output(j, why));
   return finish_report(j, why);
 }
@@ -319,7 +321,7 @@ static void end(cli_job *j)
   for (int side = 0; side < 2; side++) rcgns_close(&j->file[side]);
   for (int i = 0; i < j->num_notes; i++) free(j->note[i]);
   free(j->note);
-  for (int side = 0; side < 2; side++) free(j->mask[side]);
+  for (int side = 0; side < 2; side++) free(j->mask[side]), free(j->fraction[side]);
   free(j->values);
   free(j->row);
   free(j->field);

@@ -1,8 +1,8 @@
 /* masks -- which cells of SOURCE give values and which of TARGET want them, by a field of the file such as Iblank or cellN.
  *
  * Codes by convention, the field's name deciding: cellN (0 hole, 1 computed, above 1 interpolated), Iblank (0 hole, above 0
- * computed, below 0 interpolated), others (not 0: takes part). What is interpolated is known better where it was computed, so it
- * does not give; but a solver that starts reads it, so it wants. O(cells). */
+ * computed, below 0 interpolated), others (not 0: takes part). What is interpolated is known better where it was computed, so
+ * it does not give; but a solver that starts reads it, so it wants. O(cells). */
 #include "job.h"
 
 #include <fnmatch.h>
@@ -139,17 +139,28 @@ cli_exit cli_masks_read(cli_job *j, cli_failure *why)
 
 /* ---- use ---------------------------------------------------------------------------------------------------------- */
 
+static cli_exit set_masks(cli_job *j, double min_coverage, cli_failure *why)
+{
+  const remap_masks masks = {
+      .gives = {j->mask[REMAP_SOURCE], NULL}, .wants = {NULL, j->mask[REMAP_TARGET]}, .min_coverage = {0, min_coverage}};
+
+  return cli_from_remap(j, remap_set_masks(j->ctx, &masks), why);
+}
+
+static bool has_masks(const cli_job *j) { return j->options.mask[REMAP_SOURCE] || j->options.mask[REMAP_TARGET]; }
+
+cli_exit cli_masks_apply(cli_job *j, cli_failure *why) { return has_masks(j) ? set_masks(j, 0, why) : CLI_DONE; }
+
 /* A mask lets zones overlap; but what gives must not: it would count twice. */
 static cli_exit check_overlap(cli_job *j, cli_failure *why)
 {
-  const double      most = 1 + 1e-6; /* zones that only abut overlap by rounding */
-  const rcgns_info *info = rcgns_get_info(j->file[REMAP_TARGET]);
-  const remap_mesh *mesh = rcgns_mesh(j->file[REMAP_TARGET]);
-  double           *fraction;
-  int64_t           cell = 0;
-  cli_exit          mine = CLI_DONE;
+  const double      most     = 1 + 1e-6; /* zones that only abut overlap by rounding */
+  const rcgns_info *info     = rcgns_get_info(j->file[REMAP_TARGET]);
+  const remap_mesh *mesh     = rcgns_mesh(j->file[REMAP_TARGET]);
+  const double     *fraction = j->fraction[REMAP_TARGET];
+  int64_t           cell     = 0;
+  cli_exit          mine     = CLI_DONE;
 
-  CLI_TRY(cli_coverage_fractions(j, REMAP_TARGET, &fraction, why));
   while (cell < mesh->num_cells && fraction[cell] <= most) cell++;
   if (cell < mesh->num_cells) {
     const rcgns_zone_info *zone = cli_zone_of(info, mesh->cell_global[cell]);
@@ -161,17 +172,13 @@ static cli_exit check_overlap(cli_job *j, cli_failure *why)
         j->options.path[REMAP_SOURCE], (long long)(mesh->cell_global[cell] - zone->first_cell + 1), zone->name, info->path,
         fraction[cell]);
   }
-  free(fraction);
   return cli_agree(j, mine, why);
 }
 
-cli_exit cli_masks_apply(cli_job *j, cli_failure *why)
+cli_exit cli_masks_settle(cli_job *j, cli_failure *why)
 {
-  const remap_masks masks = {.gives = {j->mask[REMAP_SOURCE], NULL}, .wants = {NULL, j->mask[REMAP_TARGET]}};
-
-  if (!j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET]) return CLI_DONE;
-  CLI_TRY(cli_from_remap(j, remap_set_masks(j->ctx, &masks), why));
-  return check_overlap(j, why);
+  if (has_masks(j)) CLI_TRY(check_overlap(j, why));
+  return j->options.min_coverage > 0 ? set_masks(j, j->options.min_coverage, why) : CLI_DONE;
 }
 
 void cli_masks_fill(cli_job *j)

@@ -25,39 +25,41 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
 /* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or OTHER, what it does. A second
  * line of help follows after \n. */
 #define AT(member) offsetof(cli_options, member)
-#define OPTION_LIST(X)                                                                                                       \
-  X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                     \
-  X(NATURE, 0, "nature", "NAME=NATURE,...", OTHER,                                                                           \
-    "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")  \
-  X(ORDER, 0, "order", "1|2|3", OTHER, "accuracy of the transfer; default 2")                                                \
-  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", OTHER,                                                          \
-    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                            \
-  X(FACES, 0, "faces", "centre|diagonal", OTHER, "how faces become triangles; default centre")                               \
-  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error", OTHER,                                                 \
-    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                                  \
-  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error", OTHER,                                                    \
-    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                              \
-  X(COVERAGE, 0, "coverage", NULL, AT(coverage), "write how much of each cell SOURCE covers too, as field Coverage")         \
-  X(SOURCE_COVERAGE, 0, "source-coverage", "FILE", AT(source_coverage),                                                      \
-    "write SOURCE with how much of each of its cells TARGET covers")                                                         \
-  X(SOURCE_MASK, 0, "source-mask", "FIELD[=CODES]", AT(mask[REMAP_SOURCE]),                                                  \
-    "take values only where this field of SOURCE says 'computed':\ncellN 1, Iblank above 0, others not 0, or CODES such as " \
-    "1+2")                                                                                                                   \
-  X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                  \
-    "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                         \
-  X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")    \
-  X(STEP, 0, "step", "N|last", OTHER, "or the one of a time step, counted from 1")                                           \
-  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                      \
-    "the FlowSolution_t to write; default the source's name")                                                                \
-  X(SOURCE_BASE, 0, "source-base", "NAME", AT(base[REMAP_SOURCE]), "read this base of SOURCE only")                          \
-  X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                          \
-  X(SCALE, 0, "scale", "FACTOR", OTHER, "multiply SOURCE's coordinates first")                                               \
-  X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")      \
-  X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                 \
-  X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                        \
-  X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                               \
-  X(VERBOSE, 'v', "verbose", NULL, AT(verbose), "print zones and what the library says too")                                 \
-  X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                           \
+#define OPTION_LIST(X)                                                                                                        \
+  X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                      \
+  X(NATURE, 0, "nature", "NAME=NATURE,...", OTHER,                                                                            \
+    "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")   \
+  X(ORDER, 0, "order", "1|2|3", OTHER, "accuracy of the transfer; default 2")                                                 \
+  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", OTHER,                                                           \
+    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                             \
+  X(FACES, 0, "faces", "centre|diagonal", OTHER, "how faces become triangles; default centre")                                \
+  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error", OTHER,                                                  \
+    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                                   \
+  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error", OTHER,                                                     \
+    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                               \
+  X(MIN_COVERAGE, 0, "min-coverage", "SHARE", OTHER, "cells that are covered less than this count as not covered; default 0") \
+  X(COVERAGE, 0, "coverage", NULL, AT(coverage), "write how much of each cell SOURCE covers too, as field Coverage")          \
+  X(SOURCE_COVERAGE, 0, "source-coverage", "FILE", AT(source_coverage),                                                       \
+    "write SOURCE with how much of each of its cells TARGET covers")                                                          \
+  X(SOURCE_MASK, 0, "source-mask", "FIELD[=CODES]", AT(mask[REMAP_SOURCE]),                                                   \
+    "take values only where this field of SOURCE says 'computed':\ncellN 1, Iblank above 0, others not 0, or CODES such as "  \
+    "1+2")                                                                                                                    \
+  X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                   \
+    "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                          \
+  X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")     \
+  X(STEP, 0, "step", "N|last", OTHER, "or the one of a time step, counted from 1")                                            \
+  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                       \
+    "the FlowSolution_t to write; default the source's name")                                                                 \
+  X(SOURCE_BASE, 0, "source-base", "NAME", AT(base[REMAP_SOURCE]), "read this base of SOURCE only")                           \
+  X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                           \
+  X(SCALE, 0, "scale", "FACTOR", OTHER, "multiply SOURCE's coordinates first")                                                \
+  X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")       \
+  X(CHECK, 0, "check", NULL, AT(check), "transfer known fields and say how well: PASS or FAIL; no OUTPUT")                    \
+  X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                  \
+  X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                         \
+  X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                                \
+  X(VERBOSE, 'v', "verbose", NULL, AT(verbose), "print zones and what the library says too")                                  \
+  X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                            \
   X(HELP, 'h', "help", NULL, AT(help), "print this text")
 
 enum option_key {
@@ -138,7 +140,8 @@ bool cli_nature_of(const char *text, remap_nature *nature)
 
 void cli_options_help(FILE *out)
 {
-  fputs("remap [options] SOURCE TARGET -o OUTPUT            (also under mpirun -n P)\n\n"
+  fputs("remap [options] SOURCE TARGET -o OUTPUT            (also under mpirun -n P)\n"
+        "remap [options] --check SOURCE TARGET\n\n"
         "Transfer the cell-centred fields of the CGNS file SOURCE to the mesh of the CGNS file TARGET, conservatively.\n\n",
         out);
   for (int i = 0; i < NUM_ROWS; i++) {
@@ -245,6 +248,10 @@ static cli_exit parse_value(const option_row *row, const char *argument, cli_opt
       if (!number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
         return cli_fail(why, CLI_USAGE, "--scale: '%.200s' is no factor: give a positive number", argument);
       break;
+    case KEY_MIN_COVERAGE:
+      if (!number(argument, &out->min_coverage) || !(out->min_coverage >= 0 && out->min_coverage <= 1))
+        return cli_fail(why, CLI_USAGE, "--min-coverage: '%.200s' is no share: give a number from 0 to 1", argument);
+      break;
     default: break;
   }
   return CLI_DONE;
@@ -284,7 +291,9 @@ static cli_exit add_path(cli_options *out, int *num_paths, const char *path, cli
 static cli_exit check_whole(const cli_options *out, int num_paths, cli_failure *why)
 {
   if (num_paths < 2) return cli_fail(why, CLI_USAGE, "two files are needed: give SOURCE TARGET -o OUTPUT, see remap --help");
-  if (!out->output) return cli_fail(why, CLI_USAGE, "no file to write: give -o OUTPUT, see remap --help");
+  if (out->check && (out->output || out->source_coverage))
+    return cli_fail(why, CLI_USAGE, "--check writes no fields: leave -o and --source-coverage out");
+  if (!out->check && !out->output) return cli_fail(why, CLI_USAGE, "no file to write: give -o OUTPUT, see remap --help");
   if (out->solution && out->step)
     return cli_fail(why, CLI_USAGE, "--solution and --step both choose a solution: give one of them");
   return CLI_DONE;

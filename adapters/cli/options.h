@@ -24,9 +24,11 @@ typedef struct cli_options {
   const char    *solution, *output_solution;
   const char    *transform;       /**< path of a 3x4 matrix */
   const char    *source_coverage; /**< the file to write with psi */
+  bool           check;           /**< try the two meshes, write nothing */
   bool           coverage;        /**< write phi into OUTPUT */
   int64_t        step;            /**< 1 ..; -1 the last; 0 not given */
   double         scale;
+  double         min_coverage; /**< of a target cell, 0 .. 1; default 0 */
   remap_faces    faces;
   remap_transfer transfer;
   bool           quiet, verbose, help, version;

@@ -65,12 +65,13 @@ void cli_report_overlap(FILE *out, const cli_report *report)
 }
 
 /* A cell that is not wholly covered, for people. */
-static void print_bare(FILE *out, const rcgns_info *info, const char *how, const cli_bare_cell *bare)
+static void print_bare(FILE *out, const rcgns_info *info, const char *how, const remap_partial_cell *bare)
 {
   char cell[256];
 
-  fprintf(out, "        %s %s, %.4g covered of %.4g, at %.6g %.6g %.6g\n", how, cell_words(info, bare->cell, cell, sizeof cell),
-          bare->fraction * bare->volume, bare->volume, bare->centre[0], bare->centre[1], bare->centre[2]);
+  fprintf(out, "        %s %s, %.4g covered of %.4g, at %.6g %.6g %.6g\n", how,
+          cell_words(info, bare->global_cell, cell, sizeof cell), bare->fraction * bare->volume, bare->volume,
+          bare->centroid[0], bare->centroid[1], bare->centroid[2]);
 }
 
 void cli_report_cover(FILE *out, const cli_report *report)
@@ -86,6 +87,9 @@ void cli_report_cover(FILE *out, const cli_report *report)
       fprintf(out, "%s: %lld cell%s of volume %.6g covered in part\n", side_word[side], (long long)cover->cells[REMAP_PARTIAL],
               plural(cover->cells[REMAP_PARTIAL]), cover->volume[REMAP_PARTIAL]);
     for (int i = 0; i < cover->num_partial; i++) print_bare(out, report->info[side], "least", &cover->partial[i]);
+    if (cover->num_too_little)
+      fprintf(out, "%s: %lld of these count as not covered (--min-coverage)\n", side_word[side],
+              (long long)cover->num_too_little);
     if (cover->num_uncovered)
       fprintf(out, "%s: %lld cell%s of volume %.6g not covered\n", side_word[side], (long long)cover->cells[REMAP_UNCOVERED],
               plural(cover->cells[REMAP_UNCOVERED]), cover->volume[REMAP_UNCOVERED]);
@@ -109,6 +113,20 @@ void cli_report_fields(FILE *out, const cli_report *report)
     fprintf(out, "%-*s %-13s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name,
             cli_nature_word(row->nature), what->source_integral, what->target_integral, what->conservation_error,
             what->source_min, what->source_max, what->target_min, what->target_max);
+  }
+  fflush(out);
+}
+
+bool cli_check_passes(const cli_check_row *row) { return row->is_least ? row->figure >= row->bar : row->figure <= row->bar; }
+
+void cli_report_check(FILE *out, const cli_report *report)
+{
+  fprintf(out, "\n%-14s %10s  %s\n", "check", "figure", "bar");
+  for (int i = 0; i < report->num_checks; i++) {
+    const cli_check_row *row = &report->check[i];
+
+    fprintf(out, row->is_least ? "%-14s %10.2f  at least %-8.2g %s\n" : "%-14s %10.1e  at most %-9.0e %s\n", row->name,
+            row->figure, row->bar, cli_check_passes(row) ? "PASS" : "FAIL");
   }
   fflush(out);
 }
@@ -193,16 +211,16 @@ static json_t *overlap_json(const remap_stats *stats)
 }
 
 /* A list of cells that are not wholly covered. */
-static json_t *bare_json(const rcgns_info *info, int num, const cli_bare_cell *bare)
+static json_t *bare_json(const rcgns_info *info, int num, const remap_partial_cell *bare)
 {
   json_t *list = json_array();
   char    cell[256];
 
   for (int i = 0; i < num; i++)
     json_array_append_new(list, json_pack("{s:o, s:o, s:o, s:[o, o, o]}", "cell",
-                                          words(cell_words(info, bare[i].cell, cell, sizeof cell)), "coverage",
+                                          words(cell_words(info, bare[i].global_cell, cell, sizeof cell)), "coverage",
                                           real(bare[i].fraction), "volume", real(bare[i].volume), "centre",
-                                          real(bare[i].centre[0]), real(bare[i].centre[1]), real(bare[i].centre[2])));
+                                          real(bare[i].centroid[0]), real(bare[i].centroid[1]), real(bare[i].centroid[2])));
   return list;
 }
 
@@ -216,7 +234,7 @@ static json_t *cover_json(const cli_report *report, remap_side side)
   for (int i = 3; i >= 0; i--)
     json_object_set_new(object, word[i],
                         json_pack("{s:I, s:o}", "cells", (json_int_t)cover->cells[i], "volume", real(cover->volume[i])));
-  json_object_set_new(object, "least", real(cover->least));
+  json_object_set_new(object, "too_little", json_integer((json_int_t)cover->num_too_little));
   json_object_set_new(object, "least_partial", bare_json(report->info[side], cover->num_partial, cover->partial));
   json_object_set_new(object, "largest_uncovered", bare_json(report->info[side], cover->num_uncovered, cover->uncovered));
   return object;
@@ -235,6 +253,19 @@ static json_t *field_json(const cli_field_row *row)
                    (json_int_t)what->order_reduced_cells);
 }
 
+static json_t *check_json(const cli_report *report)
+{
+  json_t *list = json_array();
+
+  for (int i = 0; i < report->num_checks; i++) {
+    const cli_check_row *row = &report->check[i];
+
+    json_array_append_new(list, json_pack("{s:s, s:o, s:o, s:b}", "name", row->name, "figure", real(row->figure), "bar",
+                                          real(row->bar), "pass", cli_check_passes(row)));
+  }
+  return list;
+}
+
 /* The whole report; NULL if memory is out. The caller ends it with json_decref. */
 static json_t *report_json(const cli_report *report)
 {
@@ -243,12 +274,12 @@ static json_t *report_json(const cli_report *report)
 
   for (int i = 0; i < report->num_fields; i++) json_array_append_new(fields, field_json(&report->field[i]));
   for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, words(report->note[i]));
-  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:{s:o, s:o}, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version",
-                   remap_version(), "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target",
+  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:{s:o, s:o}, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}",
+                   "version", remap_version(), "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target",
                    side_json(report, REMAP_TARGET), "overlap", overlap_json(stats), "coverage", "source",
-                   cover_json(report, REMAP_SOURCE), "target", cover_json(report, REMAP_TARGET), "fields", fields, "time",
-                   "read", real(report->seconds_read), "partition", real(stats->seconds_partition), "overlay",
-                   real(stats->seconds_overlay), "transfer", real(report->seconds_transfer), "write",
+                   cover_json(report, REMAP_SOURCE), "target", cover_json(report, REMAP_TARGET), "fields", fields, "check",
+                   check_json(report), "time", "read", real(report->seconds_read), "partition", real(stats->seconds_partition),
+                   "overlay", real(stats->seconds_overlay), "transfer", real(report->seconds_transfer), "write",
                    real(report->seconds_write), "total", real(report->seconds_total), "memory", "peak_rss_bytes_max",
                    (json_int_t)report->peak_rss, "notes", notes);
 }

@@ -14,6 +14,20 @@
 #define CLI_MAX_CLOSURE      1e-10
 #define CLI_MAX_CONSERVATION 1e-12
 
+#define CLI_MAX_CONSTANT 1e-12
+#define CLI_MAX_LINEAR   1e-10
+#define CLI_MAX_BEYOND   1e-12
+
+/** One figure of --check. */
+typedef struct cli_check_row {
+  const char *name;
+  double      figure, bar;
+  bool        is_least; /**< the bar is the least that passes, else the most */
+} cli_check_row;
+
+/** Is the figure good enough? A NaN is not. Not collective. */
+bool cli_check_passes(const cli_check_row *row);
+
 /** One transferred field. */
 typedef struct cli_field_row {
   const char        *name;
@@ -24,22 +38,14 @@ typedef struct cli_field_row {
 
 enum { CLI_WORST = 5 };
 
-/** A cell that is not wholly covered. */
-typedef struct cli_bare_cell {
-  int64_t cell;     /**< global */
-  double  fraction; /**< of its volume that is covered */
-  double  volume;
-  double  centre[3]; /**< its centroid */
-} cli_bare_cell;
-
 /** How much of one mesh the other covers, masks counted in. */
 typedef struct cli_cover_row {
-  int64_t       cells[4];  /**< [remap_cover] */
-  double        volume[4]; /**< [remap_cover] of those cells */
-  double        least;     /**< fraction of the partial cell that is covered least, 1 if there is none */
-  int           num_partial, num_uncovered;
-  cli_bare_cell partial[CLI_WORST];   /**< [num_partial] those that are covered least */
-  cli_bare_cell uncovered[CLI_WORST]; /**< [num_uncovered] the largest ones */
+  int64_t            cells[4];       /**< [remap_cover] */
+  double             volume[4];      /**< [remap_cover] of those cells */
+  int64_t            num_too_little; /**< cells covered in part that count as uncovered, by --min-coverage */
+  int                num_partial, num_uncovered;
+  remap_partial_cell partial[CLI_WORST];   /**< [num_partial] those that are covered least */
+  remap_partial_cell uncovered[CLI_WORST]; /**< [num_uncovered] the largest ones */
 } cli_cover_row;
 
 /** Everything there is to tell; texts are borrowed. */
@@ -50,6 +56,8 @@ typedef struct cli_report {
   const char          *output, *source_coverage; /**< files that were written, NULL if not */
   const char          *mask[2];                  /**< [remap_side] as asked for, NULL: none */
   cli_cover_row        cover[2];                 /**< [remap_side] */
+  int                  num_checks;
+  cli_check_row        check[5]; /**< [num_checks] of --check */
   int                  num_fields;
   const cli_field_row *field; /**< [num_fields] */
   int                  num_notes;
@@ -66,6 +74,8 @@ void cli_report_overlap(FILE *out, const cli_report *report);
 void cli_report_cover(FILE *out, const cli_report *report);
 /** A line per field: what was conserved. */
 void cli_report_fields(FILE *out, const cli_report *report);
+/** A line per figure of --check: PASS or FAIL. */
+void cli_report_check(FILE *out, const cli_report *report);
 /** Remarks, time per phase, memory, the file written; output is not mentioned if it is NULL. */
 void cli_report_end(FILE *out, const cli_report *report);
 

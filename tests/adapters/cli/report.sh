@@ -20,7 +20,7 @@ is() {
 }
 
 works 2 good.cgns mesh.cgns -o out.cgns --report report.json
-keys "" version ranks source target overlap coverage fields time memory notes
+keys "" version ranks source target overlap coverage fields check time memory notes
 keys source file zones cells volume
 keys target file zones cells volume
 keys overlap pairs volume source_covered source_partial source_uncovered target_covered target_partial target_uncovered \

@@ -43,16 +43,16 @@ quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out
 for option in order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
-for option in priority supermesh gamma check cgns-version; do
+for option in priority supermesh gamma cgns-version; do
   quick "--$option is not offered" "'--$option'" good.cgns mesh.cgns -o out/result.cgns "--$option" x
 done
 
 works 1 --help
 for option in fields nature order limiter faces on-uncovered on-partial solution step output-solution source-base target-base scale \
-  transform coverage source-coverage source-mask target-mask report output quiet verbose version help; do
+  transform check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
-if grep -E 'priority|supermesh|gamma|--check' stdout; then complain "--help offers too much"; fi
+if grep -E 'priority|supermesh|gamma' stdout; then complain "--help offers too much"; fi
 [ "$(awk 'length > 128' stdout)" = "" ] || complain "--help is wide"
 hold "$wrong" "--help says every option, and no other"
 works 2 --version
