@@ -103,6 +103,7 @@ static laid *lay(const tm_mesh *source, const tm_mesh *target, remap_faces faces
 
 static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces faces, int repeats)
 {
+  const rm_cells_choice all = {.keep = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET};
   laid        *l       = lay(source, target, faces);
   double       overlay = INFINITY, build = INFINITY;
   const double before  = peak_bytes();
@@ -116,7 +117,7 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
     remap_status      status = rm_overlay_build(arena, l->mesh, &l->part, NULL, &o, &l->reason);
     const double      t1     = cpu_seconds();
 
-    if (status == REMAP_OK) status = rm_cells_build(arena, &l->part, o, RM_CELLS_UNION, &cells, &l->reason);
+    if (status == REMAP_OK) status = rm_cells_build(arena, &l->part, o, &all, &cells, &l->reason);
     const double t2 = cpu_seconds();
     if (status != REMAP_OK) fprintf(stderr, "%d %s\n", (int)status, l->reason.text), exit(1);
     overlay = fmin(overlay, t1 - t0);

@@ -5,7 +5,7 @@
 static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
 {
   for (int way = 0; way < 4; way++) {
-    super s = super_of(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    super s = super_of(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
     super_check(&s, odd_cells, odd_cells >= 0);
     laid_free(s.l);
@@ -113,7 +113,7 @@ static void volumes_hold_far_from_the_origin(void)
 
     tm_move(a, move, &by);
     tm_move(b, move, &by);
-    super s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    super s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
     if (RT_EQ(s.status, REMAP_OK)) {
       RT_EQ(rm_cells_check(s.cells), REMAP_OK);
       super_check_volumes(&s);
@@ -126,7 +126,7 @@ static void volumes_hold_far_from_the_origin(void)
 
 /* ---- booleans ----------------------------------------------------------------------------------------------------------------------- */
 
-static const int every_keep[] = {RM_CELLS_IN_BOTH, RM_CELLS_IN_SOURCE, RM_CELLS_IN_TARGET, RM_CELLS_WHOLE_SOURCE, RM_CELLS_UNION};
+static const int every_keep[] = {REMAP_IN_BOTH, REMAP_IN_SOURCE, REMAP_IN_TARGET, SUPER_WHOLE_SOURCE, SUPER_UNION};
 
 typedef struct amount {
   rm_lid cells;
@@ -169,15 +169,15 @@ static void operations_add_up(void)
 static void identical_operands_are_their_union_and_leave_no_difference(void)
 {
   tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&two, &three, &four, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   if (RT_EQ(s.status, REMAP_OK)) {
     RT_EQ(s.cells->num_cells, a->view.num_cells);
     RT_EQ(s.cells->num_faces, a->view.num_faces);
     RT_EQ(s.cells->num_vertices, a->view.num_nodes);
   }
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 0);
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 0);
+  RT_EQ(amount_of(a, b, REMAP_IN_SOURCE).cells, 0);
+  RT_EQ(amount_of(a, b, REMAP_IN_TARGET).cells, 0);
   laid_free(s.l);
   tm_free(a);
   tm_free(b);
@@ -187,9 +187,9 @@ static void operands_with_one_skin_leave_no_difference(void)
 {
   tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&three, &two, &one, NULL);
 
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 0);
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 0);
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 4 * 4 * 4);
+  RT_EQ(amount_of(a, b, REMAP_IN_SOURCE).cells, 0);
+  RT_EQ(amount_of(a, b, REMAP_IN_TARGET).cells, 0);
+  RT_EQ(amount_of(a, b, REMAP_IN_BOTH).cells, 4 * 4 * 4);
   tm_free(a);
   tm_free(b);
 }
@@ -197,10 +197,10 @@ static void operands_with_one_skin_leave_no_difference(void)
 static void abutting_operands_share_faces_and_no_volume(void)
 {
   tm_mesh *a = boxes(&two, &two, &two, NULL), *b = boxes(&beside, &two, &two, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
   int      shared = 0;
 
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 0);
+  RT_EQ(amount_of(a, b, REMAP_IN_BOTH).cells, 0);
   if (RT_EQ(s.status, REMAP_OK)) {
     RT_EQ(s.cells->num_cells, 16);
     RT_EQ(s.cells->num_faces, 2 * a->view.num_faces - 4);
@@ -219,7 +219,7 @@ static void abutting_operands_share_faces_and_no_volume(void)
 static void nested_operands_are_the_finer_one(void)
 {
   tm_mesh *a = boxes(&one, &one, &one, NULL), *b = boxes(&two, &two, &two, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   if (RT_EQ(s.status, REMAP_OK)) {
     RT_EQ(s.cells->num_cells, b->view.num_cells);
@@ -237,9 +237,9 @@ static void components_of_a_pair_are_cells_of_their_own(void)
   static const spacing low = {1, {0, 90}}, slab = {1, {60, 80}}, across = {1, {-10, 100}};
   tm_mesh *a = boxes(&low, &one, &low, NULL), *b = boxes(&across, &slab, &across, NULL);
 
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_SOURCE).cells, 2);
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_BOTH).cells, 1);
-  RT_EQ(amount_of(a, b, RM_CELLS_IN_TARGET).cells, 1);
+  RT_EQ(amount_of(a, b, REMAP_IN_SOURCE).cells, 2);
+  RT_EQ(amount_of(a, b, REMAP_IN_BOTH).cells, 1);
+  RT_EQ(amount_of(a, b, REMAP_IN_TARGET).cells, 1);
   tm_free(a);
   tm_free(b);
 }
@@ -253,7 +253,7 @@ static void a_cell_may_have_several_voids(void)
 
   for (int way = 0; way < 2; way++) {
     const laid_how how = {.keep = {way ? keep : NULL, way ? NULL : keep}};
-    super          s   = super_of(way ? b : a, way ? a : b, REMAP_FACES_CENTRE, &how, RM_CELLS_UNION);
+    super          s   = super_of(way ? b : a, way ? a : b, REMAP_FACES_CENTRE, &how, SUPER_UNION);
     super_check(&s, 1, true);
     if (s.status == REMAP_OK) RT_EQ(s.cells->num_cells, 3);
     laid_free(s.l);
@@ -273,7 +273,7 @@ static void a_void_belongs_to_the_part_around_it(void)
   for (int k = 0; k < 9; k++) keep[3 * k + 2] = 1; /* the slab between 80 and 100 */
   keep[3 * 4]      = 1;                            /* a box within what is below */
   const laid_how how = {.keep = {NULL, keep}};
-  super          s   = super_of(a, b, REMAP_FACES_CENTRE, &how, RM_CELLS_UNION);
+  super          s   = super_of(a, b, REMAP_FACES_CENTRE, &how, SUPER_UNION);
   super_check(&s, 1, true);
   for (rm_lid c = 0; s.status == REMAP_OK && c < s.cells->num_cells; c++) {
     const double unit = s.l->frame.scale * s.l->frame.scale * s.l->frame.scale;
@@ -290,7 +290,7 @@ static void a_void_belongs_to_the_part_around_it(void)
 static void cells_that_overlap_are_refused(void)
 {
   tm_mesh *a = tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -0.25, NULL, NULL), *b = boxes(&one, &one, &one, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   RT_EQ(s.status, REMAP_BAD_MESH);
   RT_CHECK(s.l->reason.text[0] != 0);
@@ -308,7 +308,7 @@ static void squash(double xyz[3], const void *data)
 static void faces_without_area_are_refused(void)
 {
   tm_mesh *a = tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL), *b = boxes(&one, &one, &one, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   RT_EQ(s.status, REMAP_BAD_MESH);
   RT_EQ(s.l->reason.side, REMAP_SOURCE);
@@ -346,9 +346,9 @@ static void numbering_and_senders_change_no_bit(void)
                          {tm_dual((int[]){2, 2, 2}, NULL, NULL), tm_mixed((int[]){5, 2, 1}, NULL, NULL)}};
 
   for (int k = 0; k < 3; k++) {
-    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, SUPER_UNION);
     for (int senders = 1; senders < 4; senders++) {
-      super t = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, &(laid_how){.shuffle = 5 + (uint64_t)senders, .senders = senders}, RM_CELLS_UNION);
+      super t = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, &(laid_how){.shuffle = 5 + (uint64_t)senders, .senders = senders}, SUPER_UNION);
       if (RT_EQ(s.status, REMAP_OK) && RT_EQ(t.status, REMAP_OK)) compare(&s, &t);
       laid_free(t.l);
     }
@@ -373,8 +373,8 @@ static void which_mesh_is_the_source_moves_no_vertex(void)
                          {boxes(&two, &two, &two, warp), boxes(&three, &two, &three, NULL)}};
 
   for (int k = 0; k < 3; k++) {
-    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
-    super t = super_of(pair[k][1], pair[k][0], REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+    super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, SUPER_UNION);
+    super t = super_of(pair[k][1], pair[k][0], REMAP_FACES_CENTRE, NULL, SUPER_UNION);
     if (RT_EQ(s.status, REMAP_OK) && RT_EQ(t.status, REMAP_OK) && RT_EQ(t.cells->num_vertices, s.cells->num_vertices)) {
       RT_EQ(t.cells->num_faces, s.cells->num_faces);
       RT_EQ(t.cells->num_cells, s.cells->num_cells);
@@ -400,7 +400,7 @@ static void memory_that_runs_out_is_told(void)
     rm_arena       *arena = rm_arena_new();
     const rm_cells *cells = NULL;
     rm_arena_fail_at(arena, ++n);
-    status = rm_cells_build(arena, &l->part, l->overlay, RM_CELLS_UNION, &cells, NULL);
+    status = rm_cells_build(arena, &l->part, l->overlay, &(rm_cells_choice){.keep = SUPER_UNION}, &cells, NULL);
     RT_CHECK((cells != NULL) == (status == REMAP_OK));
     rm_arena_drop(arena);
   }

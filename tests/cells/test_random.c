@@ -65,7 +65,7 @@ static bool try_seed(uint64_t number, bool rough)
   const int         before = rt_failed_;
   tm_mesh          *a = random_mesh(&seed, rough), *b = random_mesh(&seed, rough);
   const remap_faces faces = tm_random(&seed, 2) ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL;
-  super             s     = super_of(a, b, faces, NULL, RM_CELLS_UNION);
+  super             s     = super_of(a, b, faces, NULL, SUPER_UNION);
   const bool        plain = s.l->mesh[0] && s.l->mesh[1] && is_plain(s.l->mesh[0]) && is_plain(s.l->mesh[1]);
 
   if (plain) super_check(&s, -1, faces == REMAP_FACES_DIAGONAL); /* centres do not have few bits */
@@ -104,7 +104,7 @@ static void crumbs_in_large_cells_have_a_supermesh(void)
     for (int64_t c = 0; c < crumbs->view.num_cells; c++) keep[c] = tm_random(&seed, 3) == 0;
     for (int way = 0; way < 2; way++) {
       const laid_how how = {.keep = {way ? keep : NULL, way ? NULL : keep}};
-      super          s   = super_of(way ? crumbs : large, way ? large : crumbs, faces, &how, RM_CELLS_UNION);
+      super          s   = super_of(way ? crumbs : large, way ? large : crumbs, faces, &how, SUPER_UNION);
 
       super_check(&s, -1, straight);
       laid_free(s.l);

@@ -23,8 +23,9 @@ upstream() {
     moments) echo "$tools mesh zone part overlay" ;;
     mapping) echo "$tools mesh zone part overlay moments" ;;
     cells) echo "$tools mesh zone part overlay" ;;
+    super) echo "$tools mesh zone part overlay cells" ;;
     field) echo "$tools mesh zone part overlay moments mapping" ;;
-    api) echo "$tools mesh zone part overlay moments mapping cells field" ;;
+    api) echo "$tools mesh zone part overlay moments mapping cells super field" ;;
     *) echo "unknown" ;;
   esac
 }

@@ -208,19 +208,17 @@ static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_h
       if (neighbour >= 0) laid_add_face_(&k, loop, len, -1, neighbour, k.sender[b], skin[f]);
     }
   }
-  l->part.piece[side] = (rm_piece){k.num_nodes,
-                                   k.num_faces,
-                                   n,
-                                   (const double(*)[3])k.xyz,
-                                   k.offset,
-                                   k.face_node,
-                                   (const rm_lid(*)[2])k.face_cell,
-                                   k.skin,
-                                   global,
-                                   rank,
-                                   home,
-                                   NULL,
-                                   NULL};
+  l->part.piece[side] = (rm_piece){.num_nodes      = k.num_nodes,
+                                   .num_faces      = k.num_faces,
+                                   .num_cells      = n,
+                                   .node_xyz       = (const double(*)[3])k.xyz,
+                                   .face_offset    = k.offset,
+                                   .face_node      = k.face_node,
+                                   .face_cell      = (const rm_lid(*)[2])k.face_cell,
+                                   .face_is_skin   = k.skin,
+                                   .cell_global    = global,
+                                   .cell_home_rank = rank,
+                                   .cell_home      = home};
 }
 
 /* Volumes and centroids of the cells as they are triangulated, in an order that depends on coordinates alone. */

@@ -1,7 +1,7 @@
 /* super -- the supermesh of two test meshes, and what must hold of it: closed cells, each of their edges in two faces, volumes as
  * the moments have them, faces that cover those they came from, no vertex inside an edge.
  *
- *   super s = super_of(source, target, REMAP_FACES_CENTRE, NULL, RM_CELLS_UNION);
+ *   super s = super_of(source, target, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
  *   super_check(&s, 0, false);
  *   laid_free(s.l); */
 #ifndef SUPER_H
@@ -11,6 +11,8 @@
 #include "laid.h"
 #include "rt.h"
 
+enum { SUPER_WHOLE_SOURCE = REMAP_IN_BOTH | REMAP_IN_SOURCE, SUPER_UNION = SUPER_WHOLE_SOURCE | REMAP_IN_TARGET };
+
 typedef struct super {
   laid           *l;
   const rm_cells *cells;
@@ -19,9 +21,10 @@ typedef struct super {
 
 static inline super super_of(const tm_mesh *source, const tm_mesh *target, remap_faces faces, const laid_how *how, int keep)
 {
-  super s = {laid_over(source, target, faces, how), NULL, REMAP_OK};
+  const rm_cells_choice choice = {.keep = keep};
+  super                 s      = {laid_over(source, target, faces, how), NULL, REMAP_OK};
 
-  s.status = s.l->status == REMAP_OK ? rm_cells_build(s.l->arena, &s.l->part, s.l->overlay, keep, &s.cells, &s.l->reason) : s.l->status;
+  s.status = s.l->status == REMAP_OK ? rm_cells_build(s.l->arena, &s.l->part, s.l->overlay, &choice, &s.cells, &s.l->reason) : s.l->status;
   return s;
 }
 
@@ -81,12 +84,12 @@ static inline void super_faces_are_covered_(const super *s)
       const rm_lid t = s->cells->face_triangle[f][side];
       double       a[3];
       super_area_vector_(s->cells, f, a);
-      if (t >= 0) sum[m->triangle_face[t]] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+      if (t >= 0) sum[rm_face_of_triangle(m, t)] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     }
     for (rm_lid t = 0; t < m->num_triangles; t++) {
       const double *v = m->normal[t];
       if (t && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle)) continue; /* counts as the first that lies there */
-      area[m->triangle_face[t]] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      area[rm_face_of_triangle(m, t)] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
     for (rm_lid f = 0; f < n; f++)
       if (area[f] > 0) worst = fmax(worst, fabs(sum[f] - area[f]) / area[f]);
@@ -164,7 +167,7 @@ static inline void super_cells_are_manifold_(const super *s, int odd_cells)
   free(seen);
 }
 
-/* All of it, for RM_CELLS_UNION. odd_cells: as many cells have voids or handles, -1: any number. coarse: coordinates have so few bits
+/* All of it, for SUPER_UNION. odd_cells: as many cells have voids or handles, -1: any number. coarse: coordinates have so few bits
  * that points within 1e-13 are equal. */
 static inline void super_check(const super *s, int odd_cells, bool coarse)
 {

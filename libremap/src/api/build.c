@@ -134,6 +134,7 @@ static remap_status build_anew(remap_context *ctx, const bool moves[2], bool kee
   rm_context_drop_carriers(ctx);
   ctx->mapping = NULL;
   rm_context_drop_masks(ctx);
+  rm_context_drop_super(ctx);
   rm_arena_drop(ctx->arena);
   ctx->arena    = rm_arena_new();
   ctx->is_built = false;

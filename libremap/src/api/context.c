@@ -120,6 +120,7 @@ void remap_destroy(remap_context **ctx)
   rm_context_drop_carriers(*ctx);
   rm_context_drop_masks(*ctx);
   rm_context_drop_place(*ctx);
+  rm_context_drop_super(*ctx);
   rm_context_drop_meshes(*ctx);
   rm_arena_drop((*ctx)->arena);
   for (int side = 0; side < 2; side++) free((*ctx)->block[side]);

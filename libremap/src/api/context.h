@@ -4,6 +4,7 @@
 
 #include "field/field.h"
 #include "overlay/overlay.h"
+#include "super/super.h"
 
 /* Names of one mesh, copied so that messages can use them after the caller's arrays are gone. */
 typedef struct rm_labels {
@@ -64,6 +65,9 @@ struct remap_context {
   rm_arena         *carrier_arena[2]; /* [direction] of the carrier alone, which is made anew when more has to fit in */
   rm_carrier       *carrier[2];       /* [direction] NULL until needed                                                */
   rm_load           load[2];          /* [direction] that the carrier is made for                                     */
+
+  rm_arena         *super_arena; /* of the last supermesh alone */
+  const rm_super   *super;       /* NULL: none                  */
 };
 
 /* Put what *reason says about a failure into the context's message, with mesh, zone and cell by name. Not collective. */
@@ -96,6 +100,9 @@ remap_status rm_context_progress(remap_context *ctx, const char *phase, double d
 
 /* Forget masks. Not collective. */
 void rm_context_drop_masks(remap_context *ctx);
+
+/* Forget the supermesh. Not collective. */
+void rm_context_drop_super(remap_context *ctx);
 
 /* Is a transfer under way in either direction? */
 bool rm_context_is_busy(const remap_context *ctx);

@@ -13,6 +13,7 @@ typedef struct work {
   rm_polygons      p;
   rm_glued         glued;
   rm_faces         faces;
+  const rm_cells_choice *choice;
   rm_lid          *new_cell; /* [glued.num_cells] RM_OUTSIDE if it is not kept */
   rm_lid          *loop;     /* of the present group of polygons */
   rm_cells        *out;
@@ -22,16 +23,20 @@ typedef struct work {
 
 static remap_status make_polygons(work *w, const rm_overlay *o, rm_reason *reason)
 {
+  const double start   = rm_seconds();
   rm_arena    *passing = rm_arena_new();
   remap_status status  = passing ? rm_limit_build(w->limit_arena, passing, w->part, o, &w->l, reason) : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = rm_polygons_build(w->part, w->l, &w->p, reason);
   rm_arena_drop(passing);
+  w->out->num_polygons     = w->p.num;
+  w->out->seconds_polygons = rm_seconds() - start;
   return status;
 }
 
 static remap_status make_cells(work *w, rm_reason *reason)
 {
+  const double start   = rm_seconds();
   rm_arena    *passing = rm_arena_new();
   rm_arcs      arcs;
   remap_status status = passing ? rm_arcs_build(passing, w->l->num_spots, &w->p, &arcs) : REMAP_NO_MEMORY;
@@ -39,28 +44,33 @@ static remap_status make_cells(work *w, rm_reason *reason)
   if (status == REMAP_OK) status = rm_glue(w->scratch, w->l, &w->p, &arcs, &w->glued);
   if (status == REMAP_BAD_MESH)
     rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap or are inverted");
+  w->out->seconds_glue = rm_seconds() - start;
   if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued, &w->faces);
   rm_arena_drop(passing);
+  w->out->seconds_faces = rm_seconds() - start - w->out->seconds_glue;
   return status;
 }
 
 /* ---- selection ----------------------------------------------------------------------------------------------------------- */
 
-static bool is_kept(rm_label label, int keep)
+static bool is_kept(rm_label label, const rm_cells_choice *choice)
 {
-  const bool source = label.cell[0] != RM_OUTSIDE, target = label.cell[1] != RM_OUTSIDE;
-  return keep & (source && target ? RM_CELLS_IN_BOTH : source ? RM_CELLS_IN_SOURCE : RM_CELLS_IN_TARGET);
+  const bool in[2] = {label.cell[0] != RM_OUTSIDE, label.cell[1] != RM_OUTSIDE};
+  const int  side  = in[0] && in[1] ? choice->owner : in[0] ? 0 : 1;
+
+  if (!(choice->keep & (in[0] && in[1] ? REMAP_IN_BOTH : in[0] ? REMAP_IN_SOURCE : REMAP_IN_TARGET))) return false;
+  return !choice->core[side] || (choice->core[side][label.cell[side]] & 1);
 }
 
 /* Number the cells that are kept. */
-static remap_status select_cells(work *w, int keep)
+static remap_status select_cells(work *w)
 {
   const rm_glued *g = &w->glued;
   rm_lid (*ancestor)[2];
   double *volume;
 
   RM_NEW(w->new_cell, w->scratch, g->num_cells);
-  for (rm_lid c = 0; c < g->num_cells; c++) w->new_cell[c] = is_kept(g->label[c], keep) ? w->out->num_cells++ : RM_OUTSIDE;
+  for (rm_lid c = 0; c < g->num_cells; c++) w->new_cell[c] = is_kept(g->label[c], w->choice) ? w->out->num_cells++ : RM_OUTSIDE;
   RM_NEW(ancestor, w->arena, w->out->num_cells);
   RM_NEW(volume, w->arena, w->out->num_cells);
   for (rm_lid c = 0; c < g->num_cells; c++) {
@@ -139,18 +149,31 @@ static void count_face(work *w, const face *f, void *user)
 typedef struct result {
   const rm_lid *new_vertex;
   int64_t      *offset;
-  rm_lid       *vertex, (*cell)[2], (*triangle)[2], num;
+  rm_lid       *vertex, (*cell)[2], (*beyond)[2], (*triangle)[2], num;
 } result;
+
+/* Ancestors of the cell on the far side of a face, if that is not kept. */
+static void set_beyond(const work *w, const face *f, rm_lid beyond[2])
+{
+  const int64_t k = f->of - w->p.polygon;
+
+  beyond[0] = beyond[1] = RM_OUTSIDE;
+  if (f->cell[1] >= 0) return;
+  for (int h = 0; h < 2; h++) {
+    const rm_lid c = w->glued.cell[2 * k + h];
+    if (c >= 0 && w->new_cell[c] < 0) memcpy(beyond, w->glued.label[c].cell, sizeof w->glued.label[c].cell);
+  }
+}
 
 static void keep_face(work *w, const face *f, void *user)
 {
   result       *r  = user;
   const int64_t at = r->offset[r->num];
 
-  (void)w;
   for (rm_lid i = 0; i < f->num; i++) r->vertex[at + i] = r->new_vertex[f->vertex[f->turned ? f->num - 1 - i : i]];
   memcpy(r->cell[r->num], f->cell, sizeof f->cell);
   for (int side = 0; side < 2; side++) r->triangle[r->num][side] = rm_polygon_triangle(f->of, side);
+  set_beyond(w, f, r->beyond[r->num]);
   r->offset[++r->num] = at + f->num;
 }
 
@@ -159,6 +182,7 @@ static remap_status make_faces(work *w)
   rm_cells *out = w->out;
   rm_lid   *new_vertex, longest = 0;
   double  (*xyz)[3];
+  rm_spot  *spot;
   tally     t = {0, NULL};
   result    r = {0};
 
@@ -174,9 +198,11 @@ static remap_status make_faces(work *w)
   each_face(w, count_face, &t);
   for (rm_lid s = 0; s < w->l->num_spots; s++) out->num_vertices += new_vertex[s];
   RM_NEW(xyz, w->arena, out->num_vertices);
+  RM_NEW(spot, w->arena, out->num_vertices);
   for (rm_lid s = 0, n = 0; s < w->l->num_spots; s++) {
     if (!new_vertex[s]) continue;
     memcpy(xyz[n], w->l->xyz[s], sizeof *xyz);
+    spot[n]       = w->l->spot[s];
     new_vertex[s] = n++;
   }
   rm_arena_drop(w->limit_arena);
@@ -186,33 +212,39 @@ static remap_status make_faces(work *w)
   RM_NEW(r.offset, w->arena, (int64_t)out->num_faces + 1);
   RM_NEW(r.vertex, w->arena, t.corners);
   RM_NEW(r.cell, w->arena, out->num_faces);
+  RM_NEW(r.beyond, w->arena, out->num_faces);
   RM_NEW(r.triangle, w->arena, out->num_faces);
   r.offset[0] = 0;
   each_face(w, keep_face, &r);
   out->vertex        = (const double (*)[3])xyz;
+  out->vertex_spot   = spot;
   out->face_offset   = r.offset;
   out->face_vertex   = r.vertex;
   out->face_cell     = (const rm_lid (*)[2])r.cell;
+  out->face_beyond   = (const rm_lid (*)[2])r.beyond;
   out->face_triangle = (const rm_lid (*)[2])r.triangle;
   return REMAP_OK;
 }
 
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int keep, const rm_cells **out,
-                            rm_reason *reason)
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_cells_choice *choice,
+                            const rm_cells **out, rm_reason *reason)
 {
-  work         w      = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part};
+  work         w      = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part, .choice = choice};
   remap_status status = w.scratch && w.limit_arena ? REMAP_OK : REMAP_NO_MEMORY;
 
   w.out = rm_arena_zero(arena, 1, sizeof *w.out);
   if (!w.out) status = REMAP_NO_MEMORY;
   if (status == REMAP_OK) status = make_polygons(&w, overlay, reason);
   if (status == REMAP_OK) status = make_cells(&w, reason);
-  if (status == REMAP_OK) status = select_cells(&w, keep);
+  if (status == REMAP_OK) status = select_cells(&w);
+  const double start = rm_seconds();
   if (status == REMAP_OK) status = make_faces(&w);
   free(w.p.polygon);
   free(w.p.vertex);
   rm_arena_drop(w.scratch);
   rm_arena_drop(w.limit_arena);
-  if (status == REMAP_OK) *out = w.out;
-  return status;
+  if (status != REMAP_OK) return status;
+  w.out->seconds_faces += rm_seconds() - start;
+  *out = w.out;
+  return REMAP_OK;
 }

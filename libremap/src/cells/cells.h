@@ -10,14 +10,26 @@
 
 #include "overlay/overlay.h"
 
-/* What of the supermesh to keep, by ancestors; bits add up. */
-enum {
-  RM_CELLS_IN_BOTH       = 1, /* intersection                                                      */
-  RM_CELLS_IN_SOURCE     = 2, /* source less target                                                */
-  RM_CELLS_IN_TARGET     = 4, /* target less source                                                */
-  RM_CELLS_WHOLE_SOURCE  = 3, /* the source with the target's faces in it: difference + intersection */
-  RM_CELLS_UNION         = 7
-};
+/* Which cells to keep, and how their faces are made. */
+typedef struct rm_cells_choice {
+  int            keep;          /* REMAP_IN_ bits                                                                         */
+  int            owner;         /* side of the mesh whose cells decide about what lies in both                            */
+  const uint8_t *core[2];       /* [side][cells of the piece] pieces of cells with bit 0 are kept; NULL: of all           */
+  bool           aggregate;     /* warped pieces of one face too become one polygon, where cells stay closed              */
+  bool           split_concave; /* concave polygons are cut into convex ones                                              */
+} rm_cells_choice;
+
+/* Where a point lies in one of the meshes: on a vertex, inside an edge or triangle, or anywhere else. */
+typedef enum rm_kind { RM_ON_VERTEX, RM_ON_EDGE, RM_ON_TRIANGLE, RM_ON_NOTHING } rm_kind;
+typedef struct rm_feature {
+  rm_kind kind;
+  rm_lid  id;
+} rm_feature;
+
+/* A vertex of the supermesh: a vertex of one mesh, or an edge of one with an edge or a triangle of the other. */
+typedef struct rm_spot {
+  rm_feature at[2]; /* [side] */
+} rm_spot;
 
 /* Read-only once built. Invariants:
  *   every vertex is used; loops have at least three vertices, none twice, and do not cross themselves;
@@ -27,20 +39,24 @@ enum {
 typedef struct rm_cells {
   rm_lid         num_vertices, num_faces, num_cells;
   const double (*vertex)[3];        /* [num_vertices] mesh room's frame                                                       */
+  const rm_spot *vertex_spot;       /* [num_vertices] what it is                                                              */
   const int64_t *face_offset;       /* [num_faces + 1]                                                                        */
   const rm_lid  *face_vertex;       /* [face_offset[num_faces]] loops                                                         */
   const rm_lid (*face_cell)[2];     /* [num_faces] owner, neighbour or RM_OUTSIDE                                             */
+  const rm_lid (*face_beyond)[2];   /* [num_faces] ancestors of what is behind a face without neighbour                       */
   const rm_lid (*face_triangle)[2]; /* [num_faces] triangle of mesh 1 and of mesh 2 it lies in, -1 (of several: the first)    */
   const rm_lid (*cell_ancestor)[2]; /* [num_cells] cells of part->piece[0] and [1], RM_OUTSIDE                                */
   const double  *cell_volume;       /* [num_cells] of the exact cell, not of its rounded vertices                             */
+  int64_t        num_polygons;      /* before pieces of a face were put together                                              */
+  double         seconds_polygons, seconds_glue, seconds_faces;
 } rm_cells;
 
-/* Build the cells whose ancestors `keep` names (RM_CELLS_ bits). Pieces of one original face between the same two cells become one
- * polygon where they are coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in
- * arena. BAD_MESH with the reason if cells of one mesh overlap or cross each other, or if a triangle of a face has no area: a
- * supermesh needs meshes without. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int keep, const rm_cells **out,
-                            rm_reason *reason);
+/* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
+ * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH with the
+ * reason if cells of one mesh overlap or cross each other, or if a triangle of a face has no area: see rm_cells_mesh. O(n log n) in
+ * crossings, n^2 in the vertices of a face with holes. */
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_cells_choice *choice,
+                            const rm_cells **out, rm_reason *reason);
 
 /* Every invariant above but the last; slow. Not collective. INTERNAL if one is broken. */
 remap_status rm_cells_check(const rm_cells *cells);

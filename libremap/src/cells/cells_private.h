@@ -15,18 +15,6 @@
 
 enum { RM_UNKNOWN = INT32_MAX }; /* no state yet */
 
-/* Where in a mesh a point lies: on a vertex, inside an edge or triangle, or anywhere else. */
-typedef enum rm_kind { RM_ON_VERTEX, RM_ON_EDGE, RM_ON_TRIANGLE, RM_ON_NOTHING } rm_kind;
-typedef struct rm_feature {
-  rm_kind kind;
-  rm_lid  id;
-} rm_feature;
-
-/* A vertex of the supermesh: a vertex of one mesh, or an edge of one with an edge or a triangle of the other. */
-typedef struct rm_spot {
-  rm_feature at[2]; /* [side] */
-} rm_spot;
-
 /* The limit of the overlay. Triangles of a mesh that lie on each other count as the first of them, with the sides that are left
  * when cells on both sides of the stack cancel. A triangle whose sides all cancel is absent. */
 typedef struct rm_limit {

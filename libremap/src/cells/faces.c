@@ -13,7 +13,7 @@ static rm_lid root(rm_lid *parent, rm_lid k)
 static bool same_face(const rm_limit *l, int side, rm_lid a, rm_lid b)
 {
   if (a < 0 || b < 0) return a == b;
-  return l->o->mesh[side]->triangle_face[a] == l->o->mesh[side]->triangle_face[b];
+  return rm_face_of_triangle(l->o->mesh[side], a) == rm_face_of_triangle(l->o->mesh[side], b);
 }
 
 static bool coplanar(const rm_limit *l, int side, rm_lid a, rm_lid b)

@@ -92,7 +92,7 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
 {
   rm_lid   num_faces = 0, num_nodes = 0;
   int64_t  num_corners = 0, *offset;
-  rm_lid  *node, (*cell)[2];
+  rm_lid  *node, (*cell)[2], *given;
   uint8_t *is_skin;
 
   for (rm_lid f = 0; f < loops->num; f++) {
@@ -104,6 +104,7 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
   RM_NEW(node, arena, num_corners);
   RM_NEW(cell, arena, num_faces);
   RM_NEW(is_skin, arena, num_faces);
+  RM_NEW(given, arena, num_faces);
   memset(new_node, -1, (size_t)loops->num_nodes * sizeof *new_node);
   num_faces = 0;
   offset[0] = num_corners = 0;
@@ -117,6 +118,7 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
     }
     memcpy(cell[num_faces], loops->cell[f], sizeof cell[num_faces]);
     is_skin[num_faces]  = loops->is_skin[f];
+    given[num_faces]    = loops->given[f];
     offset[++num_faces] = num_corners;
   }
   out->num_faces    = num_faces;
@@ -125,6 +127,7 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
   out->face_node    = node;
   out->face_cell    = (const rm_lid(*)[2])cell;
   out->face_is_skin = is_skin;
+  out->face_given   = given;
   return REMAP_OK;
 }
 

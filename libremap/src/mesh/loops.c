@@ -94,6 +94,7 @@ static void clean_loops(const remap_mesh *given, const rm_lid *node_of, rm_loops
     out->cell[out->num][0]    = (rm_lid)given->face_owner[f];
     out->cell[out->num][1]    = (rm_lid)given->face_neighbour[f];
     out->is_skin[out->num]    = given->face_neighbour[f] < 0;
+    out->given[out->num]      = (rm_lid)f;
     out->offset[out->num + 1] = out->offset[out->num] + left;
     out->num++;
   }
@@ -145,6 +146,7 @@ remap_status rm_mesh_loops(const rm_mesh_job *job, rm_loops *out)
   RM_NEW(out->node, job->scratch, num_corners);
   RM_NEW(out->cell, job->scratch, given->num_faces);
   RM_NEW(out->is_skin, job->scratch, given->num_faces);
+  RM_NEW(out->given, job->scratch, given->num_faces);
   RM_TRY(unify_nodes(job, node_of, out));
   RM_TRY(make_boxes(job, node_of, out));
   clean_loops(given, node_of, out);

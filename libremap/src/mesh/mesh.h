@@ -30,6 +30,7 @@ typedef struct rm_mesh {
   const rm_lid   *face_node;        /* [face_offset[num_faces]]                                            */
   const rm_lid  (*face_cell)[2];    /* [num_faces] owner, neighbour or -1                                  */
   const uint8_t  *face_is_skin;     /* [num_faces] 1: no cell beside it on any rank or in any zone         */
+  const rm_lid   *face_given;       /* [num_faces] the caller's number                                     */
   const int64_t  *cell_face_offset; /* [num_cells + 1]                                                     */
   const rm_lid   *cell_face;        /* [cell_face_offset[num_cells]]                                       */
   const rm_gid   *cell_global;      /* [num_cells]                                                         */

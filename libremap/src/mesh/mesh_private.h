@@ -32,6 +32,7 @@ typedef struct rm_loops {
   rm_lid         *node;       /* [offset[num]]                                                       */
   rm_lid        (*cell)[2];   /* [num] owner, neighbour or -1; owner -1 once the other side has it   */
   uint8_t        *is_skin;    /* [num]                                                               */
+  rm_lid         *given;      /* [num] the caller's number                                          */
   double        (*cell_box)[6]; /* [given num_cells] of all given faces                              */
 } rm_loops;
 

@@ -75,8 +75,19 @@ static remap_status marked_cells(rm_arena *arena, const rm_piece *p, const uint8
     volume[number[c]] = p->cell_volume[c];
     memcpy(centroid[number[c]], p->cell_centroid[c], sizeof *centroid);
   }
-  *out = (rm_piece){p->num_nodes, num_faces, num_cells, p->node_xyz, offset, node, (const rm_lid (*)[2])cell, skin,
-                    global, rank, home, volume, (const double (*)[3])centroid};
+  *out = (rm_piece){.num_nodes      = p->num_nodes,
+                    .num_faces      = num_faces,
+                    .num_cells      = num_cells,
+                    .node_xyz       = p->node_xyz,
+                    .face_offset    = offset,
+                    .face_node      = node,
+                    .face_cell      = (const rm_lid (*)[2])cell,
+                    .face_is_skin   = skin,
+                    .cell_global    = global,
+                    .cell_home_rank = rank,
+                    .cell_home      = home,
+                    .cell_volume    = volume,
+                    .cell_centroid  = (const double (*)[3])centroid};
   return REMAP_OK;
 }
 

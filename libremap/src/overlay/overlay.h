@@ -36,7 +36,8 @@ typedef struct rm_trimesh {
   const rm_lid (*triangle_edge)[3];     /* [num_triangles]                                                       */
   const rm_lid (*side)[2];              /* [num_triangles] left and right cell, RM_OUTSIDE where there is none   */
   const uint8_t *triangle_is_skin;      /* [num_triangles] 1: skin of the whole mesh, not only of this piece     */
-  const rm_lid  *triangle_face;         /* [num_triangles] face of the piece, the lowest if it is of two         */
+  const rm_lid (*triangle_face)[2];     /* [num_triangles] faces of the piece that gave it to the cells left and right of it, -1
+                                           where there is none; two where cells of two ranks or zones join      */
   const double (*normal)[3];            /* [num_triangles] rounded; magnitude is twice the area                  */
   const rm_lid (*edge)[2];              /* [num_edges] vertices, ascending                                       */
   const rm_lid  *star_offset;           /* [num_edges + 1]                                                       */
@@ -55,6 +56,13 @@ typedef struct rm_trimesh {
   const double (*skin_box)[6];          /* [num_skin]                                                            */
   const rm_boxtree *skin_tree;          /* over skin_box                                                         */
 } rm_trimesh;
+
+/* The face of the piece that a triangle is part of, the lower one if it is of two. */
+static inline rm_lid rm_face_of_triangle(const rm_trimesh *mesh, rm_lid t)
+{
+  const rm_lid *f = mesh->triangle_face[t];
+  return f[0] < 0 || (f[1] >= 0 && f[1] < f[0]) ? f[1] : f[0];
+}
 
 /* Triangulate a piece. Not collective. Lives in arena. O(n). TOO_LARGE beyond 2^29 triangles. */
 remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,

@@ -183,7 +183,7 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
 /* Join the two copies of a triangle that lie on opposite sides; any other number of copies stays apart, each a skin. */
 static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
 {
-  rm_lid (*triangle)[3], (*side)[2], *face;
+  rm_lid (*triangle)[3], (*side)[2], (*face)[2];
   uint8_t *skin;
   rm_lid   count = 0;
 
@@ -197,10 +197,11 @@ static remap_status join_triangles(rm_arena *arena, const corner_triple *triple,
     const bool joined = k == i + 2 && triple[i].right != triple[i + 1].right;
     for (; i < k; i += 1 + joined) {
       memcpy(triangle[count], triple[i].v, sizeof *triangle);
-      face[count]    = joined && triple[i + 1].face < triple[i].face ? triple[i + 1].face : triple[i].face;
-      side[count][0] = side[count][1] = RM_OUTSIDE;
-      side[count][triple[i].right]    = triple[i].cell;
-      if (joined) side[count][triple[i + 1].right] = triple[i + 1].cell;
+      face[count][0] = face[count][1] = side[count][0] = side[count][1] = RM_OUTSIDE;
+      for (int h = 0; h <= joined; h++) {
+        side[count][triple[i + h].right] = triple[i + h].cell;
+        face[count][triple[i + h].right] = triple[i + h].face;
+      }
       skin[count++] = !joined && triple[i].skin;
     }
   }
@@ -208,7 +209,7 @@ static remap_status join_triangles(rm_arena *arena, const corner_triple *triple,
   m->triangle         = (const rm_lid (*)[3])triangle;
   m->side             = (const rm_lid (*)[2])side;
   m->triangle_is_skin = skin;
-  m->triangle_face    = face;
+  m->triangle_face    = (const rm_lid (*)[2])face;
   return REMAP_OK;
 }
 

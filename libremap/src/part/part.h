@@ -17,6 +17,7 @@ typedef struct rm_piece {
   const rm_lid  (*face_cell)[2];     /* [num_faces] owner, neighbour or -1; a kept face's missing owner: the
                                         loop is turned so that face_cell[f][0] >= 0 always                 */
   const uint8_t  *face_is_skin;      /* [num_faces] of the whole mesh, as in rm_mesh                        */
+  const rm_lid   *face_home;         /* [num_faces] the caller's number, on the home rank of its cells      */
   const rm_gid   *cell_global;       /* [num_cells]                                                         */
   const int      *cell_home_rank;    /* [num_cells] whose part of the mesh it belongs to                    */
   const rm_lid   *cell_home;         /* [num_cells] its number there                                        */
@@ -46,5 +47,20 @@ remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame 
                            const rm_zone *zone, const rm_part **out, rm_reason *reason);
 /* Every invariant above; slow. Not collective. */
 remap_status rm_part_check(const rm_part *part);
+
+/* The part that a supermesh is made from. Each cell whose box meets the other mesh is core on exactly one rank, if it is asked for;
+ * a rank has every cell of either mesh whose box meets that of one of its core cells, so what is made of these here is what would be
+ * made of them anywhere. Read-only once built. */
+typedef struct rm_cover {
+  rm_part        part;
+  int            owner;     /* side whose core cells make what lies in both meshes: that of more cells that meet the other */
+  const uint8_t *flag[2];   /* [side][cells of the piece] RM_COVER_                                                       */
+  const uint8_t *is_met[2]; /* [side][cells of this rank's mesh] its box meets that of a cell of the other mesh            */
+} rm_cover;
+enum { RM_COVER_CORE = 1, RM_COVER_MET = 2 };
+
+/* keep: REMAP_IN_ bits, of what is made. Collective. Lives in arena. TOO_LARGE as rm_part_build. */
+remap_status rm_part_cover(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                           const rm_zone *zone, int keep, const rm_cover **out, rm_reason *reason);
 
 #endif

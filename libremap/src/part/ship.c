@@ -10,6 +10,7 @@ typedef struct wire_face {
   rm_lid  num_nodes;
   rm_lid  cell[2]; /* the loop's normal points out of cell[0] >= 0; cell[1] may be -1 */
   int32_t is_skin;
+  rm_lid  home; /* the caller's number */
 } wire_face;
 
 typedef struct wire_cell {
@@ -119,6 +120,7 @@ static void pack_face(packing *p, int r, rm_lid f, wire_face *face, rm_lid *corn
   face->cell[0]   = owner >= 0 ? owner : other;
   face->cell[1]   = owner >= 0 ? other : -1;
   face->is_skin   = p->mesh->face_is_skin[f];
+  face->home      = p->mesh->face_given[f];
   for (rm_lid i = 0; i < num; i++) {
     const rm_lid node = loop[owner >= 0 ? i : num - 1 - i];
 
@@ -207,10 +209,12 @@ static remap_status join_faces(rm_arena *arena, int num_ranks, const parcels *in
   int64_t      *face_offset;
   rm_lid      (*face_cell)[2];
   uint8_t      *face_is_skin;
+  rm_lid       *face_home;
 
   RM_NEW(face_offset, arena, num + 1);
   RM_NEW(face_cell, arena, num);
   RM_NEW(face_is_skin, arena, num);
+  RM_NEW(face_home, arena, num);
   face_offset[0] = 0;
   for (int r = 0; r < num_ranks; r++) {
     const rm_lid first_node = (rm_lid)in->node_offset[r], first_cell = (rm_lid)cell_offset[r];
@@ -222,6 +226,7 @@ static remap_status join_faces(rm_arena *arena, int num_ranks, const parcels *in
       face_cell[i][0]    = first_cell + face->cell[0];
       face_cell[i][1]    = face->cell[1] < 0 ? -1 : first_cell + face->cell[1];
       face_is_skin[i]    = (uint8_t)face->is_skin;
+      face_home[i]       = face->home;
     }
     for (int64_t i = in->corner_offset[r]; i < in->corner_offset[r + 1]; i++) in->corner[i] += first_node;
   }
@@ -231,6 +236,7 @@ static remap_status join_faces(rm_arena *arena, int num_ranks, const parcels *in
   piece->face_node    = in->corner;
   piece->face_cell    = (const rm_lid(*)[2])face_cell;
   piece->face_is_skin = face_is_skin;
+  piece->face_home    = face_home;
   return REMAP_OK;
 }
 

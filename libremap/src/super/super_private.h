@@ -1,0 +1,70 @@
+/* super_private -- what the files of the room hand to each other, in the order of the work:
+ *
+ *   soup.c    what this rank has made, not yet numbered: vertices by what they are made of, faces, cells
+ *   pass.c    cells that meet nothing of the other mesh, and the faces they share with cells that do
+ *   number.c  numbers of equal keys over all ranks
+ *   finish.c  the soup numbered and put in order
+ *   super.c   all of it */
+#ifndef RM_SUPER_PRIVATE_H
+#define RM_SUPER_PRIVATE_H
+
+#include "super/super.h"
+
+/* How many corners make a vertex at most: an edge and a triangle. */
+enum { RM_SOUP_CORNERS = 5 };
+
+/* A vertex by what it is made of: corners are vertices of the two triangulated meshes. */
+typedef struct rm_soup_vertex {
+  double  xyz[3];
+  rm_lid  corner[RM_SOUP_CORNERS]; /* -1 from the last one on */
+  int32_t kind;                    /* 0 a corner; 1, 2 an edge of mesh 1, 2 with a triangle of the other; 3 an edge of each */
+} rm_soup_vertex;
+
+typedef struct rm_soup_face {
+  int64_t first;   /* place in loop; the next face's first ends it */
+  rm_lid  cell[2]; /* of the soup; its normal points out of cell[0]; cell[1] is -1 if it is not here */
+  rm_lid  from[2]; /* [side] the caller's face, -1 */
+  int     from_rank[2];
+} rm_soup_face;
+
+typedef struct rm_soup_cell {
+  rm_gid ancestor[2]; /* [side] -1 */
+  rm_lid home[2];
+  int    rank[2];
+  double volume;
+} rm_soup_cell;
+
+/* malloc'ed; rm_soup_free. Vertices, and faces, of equal coordinates may be there twice. */
+typedef struct rm_soup {
+  int64_t         num_corners, num_vertices, num_faces, num_cells, num_loop;
+  int64_t         corner_room, vertex_room, face_room, cell_room, loop_room;
+  double        (*corner)[3]; /* [num_corners] */
+  rm_soup_vertex *vertex;     /* [num_vertices] */
+  rm_soup_face   *face;       /* [num_faces + 1] the last one has `first` only */
+  rm_lid         *loop;       /* [num_loop] vertices */
+  rm_soup_cell   *cell;       /* [num_cells] */
+} rm_soup;
+
+void rm_soup_free(rm_soup *soup);
+/* Add a vertex that is a corner, a face from the last num vertices of the loop, all at the end. NO_MEMORY, TOO_LARGE. */
+remap_status rm_soup_add_corner(rm_soup *soup, const double xyz[3], rm_lid *vertex);
+remap_status rm_soup_add_to_loop(rm_soup *soup, rm_lid vertex);
+remap_status rm_soup_end_face(rm_soup *soup, rm_soup_face face);
+remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell);
+/* Add what room cells made. Not collective. */
+remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_overlay *overlay, const rm_cells *cells);
+
+/* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which are
+ * behind faces of `cells`, home, and add those that come. Collective. */
+remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_overlay *overlay, const rm_cells *cells,
+                           rm_soup *soup);
+
+/* Number n keys of `words` words each, key[n][words], over all ranks: equal keys get one number, from 0 without gaps, in the
+ * lexicographical order of the keys. number is [n]. Collective. Working memory from passing. O(n) for n keys mostly. */
+remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
+                             int64_t *total);
+
+/* Number the soup and put it in order. Collective. *out lives in arena. The soup's loops are used up. */
+remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out);
+
+#endif
