@@ -41,16 +41,16 @@ static remap_status agree_on_options(remap_context *ctx, const remap_supermesh_o
 /* The meshes as they stand, or read now. Collective. */
 static remap_status supermesh(remap_context *ctx, const remap_supermesh_options *options, bool has_out, rm_arena *passing, rm_reason *reason)
 {
-  static const bool  both[2]  = {true, true};
   const rm_progress  progress = {ctx->options.progress, ctx->options.user};
   const rm_super_job job      = {&ctx->comm, &ctx->frame, ctx->mesh, ctx->options.faces, options, &progress};
-  bool               is_built = false;
+  bool               is_new[2] = {true, true}, is_built = false;
 
   RM_TRY(agree_on_options(ctx, options, has_out, &is_built, reason));
   if (!is_built) {
     ctx->is_built = false;
     for (int side = 0; side < 2; side++) ctx->is_turned[side] = false;
-    RM_TRY(rm_context_read_meshes(ctx, both, passing, reason));
+    rm_context_drop_place(ctx);
+    RM_TRY(rm_context_read_meshes(ctx, is_new, passing, reason));
   }
   return rm_super_build(ctx->super_arena, &job, &ctx->super, reason);
 }
