@@ -43,7 +43,8 @@ static bool coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
   return true;
 }
 
-/* +1 if the normals of triangles a and b out of their cells, cell[mesh], point the same way, -1 if opposite; for coplanar ones. */
+/* +1 if the normals of triangles a and b out of their cells, cell[mesh], point the same way, -1 if opposite; means something for
+ * coplanar ones. */
 static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int mesh_b, rm_lid b)
 {
   const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
@@ -55,9 +56,11 @@ static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int
 
 /* ---- limits: where the crossings are without simulation of simplicity ---------------------------------------------------- */
 
-/* The vertex at which a crossing lies exactly, NULL if it lies at none: an end of the edge in the triangle's plane, or a corner of
- * the triangle on the edge's line. */
-static const double *limit_vertex(const rm_overlay *o, const corner *c)
+/* Where a crossing lies exactly: nowhere in particular, at end h of its edge, at corner h of its triangle. */
+enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2 };
+
+/* AT_END + h if that end lies in the triangle's plane, AT_CORNER + h if that corner lies on the edge's line. */
+static int find_limit(const rm_overlay *o, const corner *c)
 {
   const rm_trimesh *own = o->mesh[c->mesh], *other = o->mesh[1 - c->mesh];
   const rm_lid     *t = other->triangle[c->triangle];
@@ -67,12 +70,24 @@ static const double *limit_vertex(const rm_overlay *o, const corner *c)
   for (int h = 0; h < 3; h++) v[h] = other->vertex[t[h]];
   for (int h = 0; h < 2; h++) {
     p[h] = own->vertex[own->edge[c->edge][h]];
-    if (rm_orient3d(v[0], v[1], v[2], p[h]) == 0) return p[h];
+    if (rm_orient3d(v[0], v[1], v[2], p[h]) == 0) return AT_END + h;
   }
   for (int h = 0; h < 3; h++) (void)rm_edge_side(p[0], p[1], v[h], v[(h + 1) % 3], 1, &on[h]);
   for (int h = 0; h < 3; h++)
-    if (on[h] && on[(h + 1) % 3]) return v[(h + 1) % 3];
-  return NULL;
+    if (on[h] && on[(h + 1) % 3]) return AT_CORNER + (h + 1) % 3;
+  return AT_NOTHING;
+}
+
+/* The vertex at which a corner lies exactly, NULL if it lies at none. A crossing is a corner of many polygons: its answer is kept. */
+static const double *limit_vertex(const work *w, const corner *c)
+{
+  const rm_trimesh *own = w->o->mesh[c->mesh], *other = w->o->mesh[1 - c->mesh];
+
+  if (c->edge < 0) return c->vertex;
+  uint8_t *at = &w->limit[c->mesh][c->crossing];
+  if (!*at) *at = (uint8_t)find_limit(w->o, c);
+  if (*at == AT_NOTHING) return NULL;
+  return *at < AT_CORNER ? own->vertex[own->edge[c->edge][*at - AT_END]] : other->vertex[other->triangle[c->triangle][*at - AT_CORNER]];
 }
 
 /* The projection of a corner's limit along axis k in homogeneous coordinates (x, y, w): for a crossing of p0 + lambda u, lambda =
@@ -144,6 +159,7 @@ static polygon *find_polygon(work *w, slot *s, const plane *pl)
 {
   polygon *g;
 
+  if (pl->mesh == 0 && s->last_polygon >= 0 && w->polygon[s->last_polygon].triangle == pl->triangle) return &w->polygon[s->last_polygon];
   for (int k = w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)]; k >= 0; k = w->polygon[k].chain) {
     g = &w->polygon[k];
     if (g->triangle == pl->triangle && g->mesh == pl->mesh && g->target == s->target) return g;
@@ -153,6 +169,7 @@ static polygon *find_polygon(work *w, slot *s, const plane *pl)
   int *bucket = &w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)];
   g           = &w->polygon[w->num_polygons];
   *g = (polygon){.next = s->first_polygon, .chain = *bucket, .target = s->target, .mesh = pl->mesh, .triangle = pl->triangle, .first_corner = -1};
+  if (pl->mesh == 0) s->last_polygon = w->num_polygons;
   *bucket = s->first_polygon = w->num_polygons++;
   return g;
 }
@@ -167,7 +184,9 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
   polygon      *g;
   corner       *c;
 
-  if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK || !(g = find_polygon(w, s, pl))) return;
+  if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK) return;
+  if (!(s->kinds & IN_DOUBT) && !w->o->mesh[pl->mesh]->triangle_is_skin[pl->triangle]) return;
+  if (!(g = find_polygon(w, s, pl))) return;
   relative(p, s->o, a);
   relative(q, s->o, b);
   if (!g->num_cones) memcpy(g->first, a, sizeof g->first);
@@ -178,9 +197,8 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
   }
   if ((w->status = rm_grow(&w->corner, &w->corner_room, w->num_corners + 2, sizeof *w->corner)) != REMAP_OK) return;
   c    = &w->corner[w->num_corners];
-  c[0] = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->base};
-  c[1] = (corner){-1, end->mesh, end->edge, end->triangle, end->base};
-  if (start->edge >= 0) c->vertex = limit_vertex(w->o, c);
+  c[0] = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->crossing, start->base};
+  c[1] = (corner){-1, end->mesh, end->edge, end->triangle, end->crossing, end->base};
   g->first_corner = w->num_corners;
   w->num_corners += 2;
   g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
@@ -212,14 +230,14 @@ static bool is_line(const work *w, const polygon *g)
   bool          has_first = false, has_line = false;
 
   for (int c = g->first_corner; c >= 0 && simple; c = w->corner[c].next) { /* mostly the same vertex or two, again and again */
-    const double *v = w->corner[c].vertex;
+    const double *v = limit_vertex(w, &w->corner[c]);
     if (!one) one = v;
     else if (v && !other && !is_same(v, one)) other = v;
     simple = v && (is_same(v, one) || (other && is_same(v, other)));
   }
   if (simple) return true;
   for (int c = g->first_corner; c >= 0; c = w->corner[c].next) {
-    homogeneous(w->o, &w->corner[c], w->corner[c].vertex, k, scale, has_first ? at : first);
+    homogeneous(w->o, &w->corner[c], limit_vertex(w, &w->corner[c]), k, scale, has_first ? at : first);
     if (!has_first) {
       has_first = true;
     } else if (!has_line) {
@@ -238,8 +256,8 @@ static void side_ends(const work *w, int c, int k, rm_int start[3], rm_int end[3
 {
   const corner *to = &w->corner[c + 1];
 
-  homogeneous(w->o, &w->corner[c], w->corner[c].vertex, k, RM_INT_SCALE, start);
-  homogeneous(w->o, to, to->edge < 0 ? to->vertex : limit_vertex(w->o, to), k, RM_INT_SCALE, end);
+  homogeneous(w->o, &w->corner[c], limit_vertex(w, &w->corner[c]), k, RM_INT_SCALE, start);
+  homogeneous(w->o, to, limit_vertex(w, to), k, RM_INT_SCALE, end);
 }
 
 static bool is_same_place(const rm_int a[3], const rm_int b[3])
@@ -300,12 +318,13 @@ bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s)
     const polygon *g = &w->polygon[k];
     bool           cancels = false;
 
+    if (!has_area(w, i, s, g) && is_without_area(w, g)) continue;
     for (int l = s->first_polygon; l >= 0 && !cancels; l = w->polygon[l].next) {
       const polygon *h = &w->polygon[l];
-      cancels = l != k && coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle) &&
-                facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0;
+      cancels = l != k && facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0 &&
+                coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle);
     }
-    if (!cancels && (has_area(w, i, s, g) || !is_without_area(w, g))) return true;
+    if (!cancels) return true;
   }
   return false;
 }

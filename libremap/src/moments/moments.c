@@ -28,6 +28,7 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
   memset(s, 0, sizeof *s);
   s->target        = j;
   s->first_polygon = NO_POLYGONS;
+  s->last_polygon  = -1;
   s->is_local      = MUCH_SMALLER * fmax(b[3] - b[0], fmax(b[4] - b[1], b[5] - b[2])) < w->extent;
   s->reach         = s->is_local ? 0 : w->extent;
   memcpy(s->o, w->centre, sizeof s->o);
@@ -112,7 +113,7 @@ INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, c
 
 INLINE point vertex_point(const work *w, const rm_trimesh *m, rm_lid v)
 {
-  point p = {m->vertex[v], {0, 0, 0}, {0, 0, 0}, 0, -1, -1};
+  point p = {m->vertex[v], {0, 0, 0}, {0, 0, 0}, 0, -1, -1, -1};
 
   for (int c = 0; c < 3; c++) p.at[c] = p.base[c] - w->centre[c];
   return p;
@@ -122,7 +123,8 @@ INLINE point crossing_point(const work *w, int mesh, const rm_crossing *x)
 {
   const rm_trimesh *m = w->o->mesh[mesh];
   const double     *v = m->vertex[m->edge[x->edge][0]], *u = m->vertex[m->edge[x->edge][1]], l = x->lambda;
-  point             p = {v, {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])}, {0, 0, 0}, mesh, x->edge, x->triangle / 2};
+  point             p = {v, {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])}, {0, 0, 0}, mesh, x->edge, x->triangle / 2,
+                         x - w->o->trace[mesh].crossing};
 
   relative(&p, w->centre, p.at);
   return p;
@@ -147,6 +149,7 @@ INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_
   for (int64_t k = o->end_offset[pt->triangle]; k < o->end_offset[pt->triangle + 1]; k += 2) {
     const rm_end start = o->end[k], end = o->end[k + 1];
     const rm_lid b     = start.other;
+    if (w->skin_only && !(skin & SKIN_SOURCE) && !o->mesh[1]->triangle_is_skin[b]) continue;
     const point  p     = crossing_point(w, start.at >> 1 & 1, &o->trace[start.at >> 1 & 1].crossing[start.at >> 2]);
     const point  q     = crossing_point(w, end.at >> 1 & 1, &o->trace[end.at >> 1 & 1].crossing[end.at >> 2]);
     const plane  pb    = plane_of(w, 1, b);
@@ -220,6 +223,7 @@ INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *ad
   const rm_trace   *tr   = &w->o->trace[0];
   const int         kind = FROM_SOURCE | (m->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
 
+  if (w->skin_only && !(kind & SKIN_SOURCE)) return;
   for (int h = 0; h < 3; h++) {
     const rm_lid e = m->triangle_edge[pt->triangle][h], count = tr->count[e];
     const double s = h == 2 ? -g : g;
@@ -256,6 +260,7 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
     const point p = piece_point(w, 1, f, at), q = piece_point(w, 1, f, end);
     for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
       const rm_lid b  = m->star[z] / 4;
+      if (w->skin_only && !m->triangle_is_skin[b]) continue;
       const plane  pb = plane_of(w, 1, b);
 
       add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0), (m->star[z] & 3) == 2 ? -number : number,
@@ -395,21 +400,32 @@ static remap_status push_pair(work *w, rm_lid i, const slot *s, uint8_t flags)
   return REMAP_OK;
 }
 
-/* Sum the slots marked AGAIN in double-double, and collect the polygons of those that want them. */
-static remap_status look_again(work *w, rm_lid i, bool sums, bool polygons)
+/* Sum the slots marked AGAIN in double-double. */
+static remap_status sum_again(work *w, rm_lid i)
 {
-  if (sums) {
-    RM_TRY(rm_grow(&w->exact, &w->exact_room, w->num_slots, sizeof *w->exact));
-    memset(w->exact, 0, sizeof *w->exact * (size_t)w->num_slots);
-    all_sides(w, i, add_dd);
-    for (int k = 0; k < w->num_slots; k++)
-      if (w->slots[k].kinds & AGAIN)
-        for (int c = 0; c < w->num_sums; c++) w->slots[k].sum[c] = w->exact[k][c].hi + w->exact[k][c].lo;
+  RM_TRY(rm_grow(&w->exact, &w->exact_room, w->num_slots, sizeof *w->exact));
+  memset(w->exact, 0, sizeof *w->exact * (size_t)w->num_slots);
+  all_sides(w, i, add_dd);
+  for (int k = 0; k < w->num_slots; k++)
+    if (w->slots[k].kinds & AGAIN)
+      for (int c = 0; c < w->num_sums; c++) w->slots[k].sum[c] = w->exact[k][c].hi + w->exact[k][c].lo;
+  return w->status;
+}
+
+/* Collect the polygons of the slots that want them: all polygons of those in doubt, else those in skins. */
+static remap_status collect_polygons(work *w, rm_lid i)
+{
+  w->skin_only = true;
+  for (int k = 0; k < w->num_slots; k++) {
+    slot *s = &w->slots[k];
+    if (s->first_polygon == NO_POLYGONS || fabs(s->sum[0]) > rm_moments_noise(w, i, s)) continue;
+    s->kinds |= IN_DOUBT;
+    w->skin_only = false;
   }
-  if (polygons) {
-    RM_TRY(rm_moments_no_polygons(w));
-    all_sides(w, i, rm_moments_add_polygon);
-  }
+  for (int side = 0; side < 2 && !w->limit[side]; side++) RM_NEW0(w->limit[side], w->scratch, w->o->trace[side].num_crossings);
+  RM_TRY(rm_moments_no_polygons(w));
+  all_sides(w, i, rm_moments_add_polygon);
+  w->skin_only = false;
   return w->status;
 }
 
@@ -444,16 +460,16 @@ static remap_status finish_cell(work *w, rm_lid i)
     if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
     if (fabs(s->sum[0]) <= noise || s->kinds & (SKIN_SOURCE | SKIN_TARGET)) s->first_polygon = WANTS_POLYGONS, polygons = true;
   }
-  if (sums || polygons) RM_TRY(look_again(w, i, sums, polygons));
+  if (sums) RM_TRY(sum_again(w, i));
+  if (polygons) RM_TRY(collect_polygons(w, i));
   for (int k = 0; k < w->num_slots; k++) {
-    slot      *s        = &w->slots[k];
-    const bool in_doubt = s->first_polygon != NO_POLYGONS;
+    slot *s = &w->slots[k];
 
     w->slot_of[s->target] = -1;
-    if (in_doubt && fabs(s->sum[0]) <= rm_moments_noise(w, i, s) && !rm_moments_has_volume(w, i, s))
+    if (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, i, s))
       RM_TRY(drop_pair(w, i, s));
     else
-      RM_TRY(push_pair(w, i, s, in_doubt ? skins_in(w, i, s, false) : 0));
+      RM_TRY(push_pair(w, i, s, skins_in(w, i, s, false)));
   }
   w->num_slots = 0;
   return REMAP_OK;

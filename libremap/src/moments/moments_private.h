@@ -17,7 +17,8 @@ enum {
   FROM_BOTH   = 4, /* it has segments                        */
   SKIN_SOURCE = 8, /* one of its polygons lies in the skin of mesh 1 */
   SKIN_TARGET = 16,
-  AGAIN       = 32 /* to be summed again in double-double    */
+  AGAIN       = 32, /* to be summed again in double-double   */
+  IN_DOUBT    = 64  /* its sum is within its noise           */
 };
 
 enum { NO_POLYGONS = -1, WANTS_POLYGONS = -2 };
@@ -28,6 +29,7 @@ typedef struct slot {
   int32_t num_cones;
   int     kinds;
   int     first_polygon; /* of the pair in work.polygon, NO_POLYGONS if they are not wanted */
+  int     last_polygon;  /* in a triangle of mesh 1, the latest; -1                         */
   bool    is_local;      /* o is the pair's own, not that of cell i */
   double  o[3];
   double  reach; /* the pair's points are within half of it of o, along each axis */
@@ -42,6 +44,7 @@ typedef struct point {
   int           mesh;     /* of the edge                             */
   rm_lid        edge;     /* -1 for a vertex                         */
   rm_lid        triangle; /* of the other mesh, crossed by the edge  */
+  int64_t       crossing; /* its place in the trace                  */
 } point;
 
 /* The plane a polygon lies in. */
@@ -73,6 +76,7 @@ typedef struct corner {
   int           next;     /* start of another side of the same polygon, -1 */
   int           mesh;     /* as in point             */
   rm_lid        edge, triangle;
+  int64_t       crossing;
   const double *vertex;   /* its coordinates if it is a vertex, else NULL */
 } corner;
 
@@ -110,6 +114,8 @@ typedef struct work {
   rm_dd           (*exact)[10]; /* [num_slots] sums of those marked AGAIN */
   int64_t           exact_room;
   memo             *memo; /* [NUM_MEMOS] */
+  uint8_t          *limit[2];  /* [num_crossings] where a crossing is in the limit, 0 until it is asked for; NULL likewise */
+  bool              skin_only; /* sides in triangles of a skin are all that is wanted                                     */
   remap_status      status;
   /* the result */
   rm_lid           *source, *target;
