@@ -8,6 +8,7 @@
  *   rcgns_read_cells       one of any node: masks, volumes                        (collective)
  *   rcgns_write            the file's whole tree plus new fields, to a new file   (collective)
  *   rcgns_close            give everything back                                   (collective)
+ *   rcgns_write_supermesh  a supermesh, its ancestors and boundaries, to a new file   (collective)
  *   rcgns_create           a small file from nothing: demos and tests             (not collective)
  *
  * Conventions that hold for every function below:
@@ -34,6 +35,7 @@
 #include <stdint.h>
 
 #include <remap/remap.h>
+#include <slices.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -201,6 +203,15 @@ rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solutio
 
 /** End a file and set *file to NULL. Collective, and harmless on a NULL file. */
 void rcgns_close(rcgns_file **file);
+
+/** Write a supermesh to a new HDF5 file at `path`, stamped `version` (see rcgns_create): one zone "Base/Zone" of NGON_n and
+ *  NFACE_n; a BC_t with a PointList of faces for each boundary that has outer faces, its name cut to what CGNS takes; the
+ *  ancestors (integers, counted from 1, 0: none), "Volume" and the fields in the CellCenter FlowSolution_t
+ *  "FlowSolution#Centers". The file appears when it is complete; an existing one is replaced. The bytes do not depend on the
+ *  number of ranks. Collective on comm.
+ *  Errors: USAGE (a bad name, no cells), IO, GEOMETRY (the supermesh is inconsistent), MEMORY. */
+rcgns_status rcgns_write_supermesh(MPI_Comm comm, const char *path, double version, const rslice_content *content,
+                                   rcgns_message *message);
 
 /** Write a small HDF5 file with one base "Base" and the given zones, stamped `version` (4.2 suits most readers, 3.4 suits
  *  Debian's tools). solution: name of the CellCenter FlowSolution_t, NULL if no zone has fields. An existing file is

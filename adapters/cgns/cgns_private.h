@@ -10,7 +10,9 @@
  *   sids_mesh.c  this rank's part of the mesh
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
  *   sids_fields.c  FlowSolution_t: choice, names, values
- *   sids_write.c   the plan of an output file, rcgns_write, rcgns_create
+ *   sids_write.c   the plan of an output file, rcgns_write
+ *   sids_create.c  plans from nothing, rcgns_create
+ *   sids_super.c   rcgns_write_supermesh
  *
  * Trees are in HDF5's order of dimensions: slowest first. */
 #ifndef REMAP_ADAPTERS_CGNS_PRIVATE_H
@@ -307,7 +309,7 @@ double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *
 
 /* ---- output ------------------------------------------------------------------------------------------------------- */
 
-typedef enum rc_content { RC_EMPTY, RC_LITERAL, RC_COPY, RC_VALUES, RC_LINK } rc_content;
+typedef enum rc_content { RC_EMPTY, RC_LITERAL, RC_COPY, RC_VALUES, RC_SLICE, RC_LINK } rc_content;
 
 /* A node of the file to be. */
 typedef struct rc_entry {
@@ -316,8 +318,9 @@ typedef struct rc_entry {
   int         nd;
   int64_t     dim[RC_MAX_DIMS];
   rc_content  content;
-  const void *literal;               /* LITERAL: int64_t, double or char by kind; borrowed */
-  char        kind;                  /* LITERAL */
+  const void *literal;               /* LITERAL, SLICE: int64_t, double or char by kind; borrowed */
+  char        kind;                  /* LITERAL, SLICE */
+  int64_t     begin, end, rows;      /* SLICE: this rank's values [begin, end) of each of so many rows, one after the other */
   int64_t     node;                  /* COPY: of the tree */
   int64_t     origin[RC_MAX_DIMS];   /* COPY: of the box that is taken */
   int64_t     zone, field;           /* VALUES */
@@ -334,10 +337,39 @@ int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char 
 static inline rc_entry *rc_entry_at(const rc_plan *plan, int64_t i) { return (rc_entry *)plan->entry.item + i; }
 void                    rc_plan_drop(rc_plan *plan);
 
+/* A plan whose arrays it owns; ok turns false where memory runs out, and stays so. */
+typedef struct rc_draft {
+  rc_plan  plan;
+  rc_array owned; /* void * */
+  bool     ok;
+} rc_draft;
+
+/* Space for an array that lives as long as the draft; NULL: no memory. */
+void *rc_draft_own(rc_draft *d, int64_t count, size_t size);
+/* An entry; -1: no memory. */
+int64_t rc_draft_put(rc_draft *d, int64_t parent, const char *name, const char *label, const char *type, int nd,
+                     const int64_t *dim, char kind, const void *values);
+/* Integers, as I4 where they fit. */
+int64_t rc_draft_ints(rc_draft *d, int64_t parent, const char *name, const char *label, int nd, const int64_t *dim,
+                      const int64_t *values);
+void    rc_draft_text(rc_draft *d, int64_t parent, const char *name, const char *label, const char *text);
+void    rc_draft_drop(rc_draft *d);
+
+/* Is it a name for a node? */
+bool rc_is_name(const char *name);
+
 /* A new file with every group, attribute and literal of the plan, and room for the rest. Not collective. */
 rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message *message);
 /* Fill what the skeleton left empty. Collective on the file's communicator. */
 rcgns_status rc_h5_fill(rcgns_file *file, const char *path, const rc_plan *plan, const rcgns_new_field *fields,
                         rcgns_message *message);
+
+/* Rank 0 alone: the skeleton under another name beside path, which goes to part. */
+rcgns_status rc_begin(const rc_plan *plan, const char *path, char *part, size_t size, rcgns_message *message);
+/* Rank 0 alone: bring the file to the disk and give it its name. */
+rcgns_status rc_finish(const char *part, const char *path, rcgns_message *message);
+/* All of it. Collective on the file's communicator. */
+rcgns_status rc_write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields,
+                           rcgns_message *message);
 
 #endif

@@ -201,16 +201,6 @@ static int ask_space(const char *path, int64_t bytes)
   return 0;
 }
 
-/* Claim so many bytes of disk, so that later writes cannot find it full. An error number, or 0. */
-static int claim_space(const char *path, int64_t bytes)
-{
-  const int file  = open(path, O_RDWR | O_CLOEXEC);
-  int       error = file < 0 ? errno : posix_fallocate(file, 0, (off_t)bytes);
-
-  if (file >= 0) close(file);
-  return error == EOPNOTSUPP || error == EINVAL ? 0 : error; /* a file system that cannot: writing will tell */
-}
-
 /* Everything but the values, into a new file whose space is claimed. An error number, or 0; EIO is HDF5's. */
 static int make_file(const char *path, const rc_plan *plan)
 {
@@ -233,7 +223,7 @@ static int make_file(const char *path, const rc_plan *plan)
   H5Pset_fill_time(m.large, H5D_FILL_TIME_NEVER);
   m.file = H5Fcreate(path, H5F_ACC_TRUNC, create, access);
   m.ok   = m.file >= 0;
-  error  = m.ok ? claim_space(path, most_bytes(plan)) : EIO;
+  error  = m.ok ? rslice_file_claim(path, most_bytes(plan)) : EIO;
   if (!error) make_root(&m);
   for (int64_t i = 0; i < plan->entry.count && m.ok && !error; i++) make_entry(&m, plan, i);
   if (m.ok && !error) m.ok = H5Fflush(m.file, H5F_SCOPE_LOCAL) >= 0 && H5Fget_filesize(m.file, &size) >= 0;
@@ -344,6 +334,28 @@ static rcgns_status write_values(rcgns_file *file, hid_t data, const rc_entry *e
   return status;
 }
 
+/* Write this rank's slice of each row of an array. Collective. */
+static rcgns_status write_slice(rcgns_file *file, hid_t data, const rc_entry *e, rcgns_message *message)
+{
+  const int64_t num    = e->end - e->begin;
+  const hid_t   memory = e->kind == 'I' ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE;
+  int64_t       total = 1, rounds = (num + WRITE_ROUND - 1) / WRITE_ROUND;
+  rc_box        box    = {.nd = e->nd};
+  rcgns_status  status = RCGNS_OK;
+
+  for (int d = 0; d < e->nd; d++) total *= box.shape[d] = e->dim[d];
+  MPI_Allreduce(MPI_IN_PLACE, &rounds, 1, MPI_INT64_T, MPI_MAX, file->comm);
+  for (int64_t i = 0; i < rounds * e->rows && status == RCGNS_OK; i++) {
+    const int64_t row = i / rounds, lo = rc_clamp(i % rounds * WRITE_ROUND, 0, num), hi = rc_clamp(lo + WRITE_ROUND, lo, num);
+    const int64_t at = total / e->rows * row + e->begin;
+
+    status =
+        write_failed(file, write_range(data, &box, at + lo, at + hi, memory, (const char *)e->literal + 8 * (num * row + lo)),
+                     e->name, message);
+  }
+  return status;
+}
+
 static rcgns_status fill_entry(rcgns_file *file, hid_t out, const rc_plan *plan, int64_t i, const rcgns_new_field *fields,
                                rcgns_message *message)
 {
@@ -358,7 +370,9 @@ static rcgns_status fill_entry(rcgns_file *file, hid_t out, const rc_plan *plan,
   }
   status = write_failed(file, data >= 0, e->name, message);
   if (status == RCGNS_OK)
-    status = e->content == RC_COPY ? copy_array(file, data, e, message) : write_values(file, data, e, fields, message);
+    status = e->content == RC_COPY    ? copy_array(file, data, e, message)
+             : e->content == RC_SLICE ? write_slice(file, data, e, message)
+                                      : write_values(file, data, e, fields, message);
   if (data >= 0) H5Dclose(data);
   free(name);
   free(path);
@@ -381,7 +395,8 @@ static rcgns_status fill_file(rcgns_file *file, const char *path, const rc_plan 
   for (int64_t i = 0; i < plan->entry.count && status == RCGNS_OK; i++) {
     const rc_content content = rc_entry_at(plan, i)->content;
 
-    if (content == RC_COPY || content == RC_VALUES) status = fill_entry(file, out, plan, i, fields, message);
+    if (content == RC_COPY || content == RC_VALUES || content == RC_SLICE)
+      status = fill_entry(file, out, plan, i, fields, message);
   }
   if (out >= 0) closed = H5Fclose(out) >= 0;
   return status == RCGNS_OK ? write_failed(file, closed, "(the file)", message) : status;

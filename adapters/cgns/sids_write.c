@@ -1,4 +1,4 @@
-/* sids_write -- the plan of an output file: the target's tree with a solution put in; and small files from nothing.
+/* sids_write -- the plan of an output file: the target's tree with a solution put in.
  *
  * The plan is made from the tree alone, alike on all ranks. The file is written under another name beside OUTPUT and gets its
  * name when it is complete, so that OUTPUT is never half written; its space on disk is claimed before it is filled, so that a
@@ -6,7 +6,6 @@
 #include "cgns_private.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -281,7 +280,7 @@ static rcgns_status check_solution(const change *c, int64_t zone)
   return RCGNS_OK;
 }
 
-static bool is_name(const char *name)
+bool rc_is_name(const char *name)
 {
   const size_t n = name ? strlen(name) : 0;
 
@@ -290,11 +289,11 @@ static bool is_name(const char *name)
 
 static rcgns_status check_names(const change *c)
 {
-  if (!is_name(c->solution))
+  if (!rc_is_name(c->solution))
     return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a solution: 1 to 32 characters without /",
                    c->solution ? c->solution : "");
   for (int64_t f = 0; f < c->num_fields; f++) {
-    if (!is_name(c->fields[f].name))
+    if (!rc_is_name(c->fields[f].name))
       return rc_fail(c->message, RCGNS_USAGE, "\"%.64s\" is no name for a field: 1 to 32 characters without /",
                      c->fields[f].name);
     for (int64_t g = 0; g < f; g++)
@@ -371,53 +370,30 @@ rcgns_status rcgns_check_solution(rcgns_file *file, const char *solution, rcgns_
   return rc_agree(file->comm, check_names(&c), message);
 }
 
-/* A new, empty file beside path; its name goes to out. */
-static rcgns_status make_beside(const char *path, char *out, size_t size, rcgns_message *message)
+static rcgns_status cannot_write(const char *path, int error, rcgns_message *message)
 {
-  int file = -1;
-
-  for (int i = 0; i < 100 && file < 0; i++) {
-    if ((size_t)snprintf(out, size, "%s.part-%ld-%d", path, (long)getpid(), i) >= size) {
-      errno = ENAMETOOLONG;
-      break;
-    }
-    file = open(out, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (file < 0 && errno != EEXIST) break;
-  }
-  if (file < 0) {
-    out[0] = 0;
-    return rc_fail(message, RCGNS_IO, "%s: cannot be written: %s", path, strerror(errno));
-  }
-  close(file);
-  return RCGNS_OK;
+  return error ? rc_fail(message, RCGNS_IO, "%s: cannot be written: %s", path, strerror(error)) : RCGNS_OK;
 }
 
-/* Bring the file to the disk and give it its name. */
-static rcgns_status finish(const char *part, const char *path, rcgns_message *message)
-{
-  const int file = open(part, O_RDWR | O_CLOEXEC);
-  bool      ok   = file >= 0 && !fsync(file);
-
-  if (file >= 0) ok = !close(file) && ok;
-  ok = ok && !rename(part, path);
-  return ok ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: cannot be written: %s", path, strerror(errno));
-}
-
-/* Rank 0 alone: the skeleton under another name. */
-static rcgns_status begin(const rc_plan *plan, const char *path, char *part, size_t size, rcgns_message *message)
+rcgns_status rc_begin(const rc_plan *plan, const char *path, char *part, size_t size, rcgns_message *message)
 {
   rcgns_message why = {""};
 
-  RC_TRY(make_beside(path, part, size, message));
+  RC_TRY(cannot_write(path, rslice_file_begin(path, part, size), message));
   return rc_h5_skeleton(part, plan, &why) == RCGNS_OK ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: %.900s", path, why.text);
 }
 
-static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields,
-                               rcgns_message *message)
+rcgns_status rc_finish(const char *part, const char *path, rcgns_message *message)
+{
+  return cannot_write(path, rslice_file_finish(part, path), message);
+}
+
+rcgns_status rc_write_plan(rcgns_file *file, const rc_plan *plan, const char *path, const rcgns_new_field *fields,
+                           rcgns_message *message)
 {
   char          part[PATH_MAX] = "";
   rcgns_message why            = {""};
-  rcgns_status  status         = file->rank == 0 ? begin(plan, path, part, sizeof part, message) : RCGNS_OK;
+  rcgns_status  status         = file->rank == 0 ? rc_begin(plan, path, part, sizeof part, message) : RCGNS_OK;
 
   status = rc_agree(file->comm, status, message);
   if (status == RCGNS_OK) {
@@ -425,7 +401,7 @@ static rcgns_status write_plan(rcgns_file *file, const rc_plan *plan, const char
     status = rc_h5_fill(file, part, plan, fields, &why);
     if (status != RCGNS_OK) rc_fail(message, status, "%s: %.900s", path, why.text);
   }
-  if (status == RCGNS_OK) status = rc_agree(file->comm, file->rank == 0 ? finish(part, path, message) : RCGNS_OK, message);
+  if (status == RCGNS_OK) status = rc_agree(file->comm, file->rank == 0 ? rc_finish(part, path, message) : RCGNS_OK, message);
   if (status != RCGNS_OK && file->rank == 0 && *part) unlink(part);
   return status;
 }
@@ -440,178 +416,7 @@ rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solutio
 
   status = rcgns_check_output(file, path, message);
   if (status == RCGNS_OK) status = rc_agree(file->comm, make_plan(&c), message);
-  if (status == RCGNS_OK) status = write_plan(file, &plan, path, fields, message);
+  if (status == RCGNS_OK) status = rc_write_plan(file, &plan, path, fields, message);
   rc_plan_drop(&plan);
-  return status;
-}
-
-/* ---- small files from nothing ------------------------------------------------------------------------------------- */
-
-/* A plan whose arrays it owns. */
-typedef struct draft {
-  rc_plan  plan;
-  rc_array owned; /* void * */
-  bool     ok;
-} draft;
-
-/* Space for an array that lives as long as the draft. */
-static void *own(draft *d, int64_t count, size_t size)
-{
-  void *item = rc_alloc(count, size);
-
-  if (!item || !rc_reserve(&d->owned, 1, sizeof item)) {
-    free(item);
-    d->ok = false;
-    return NULL;
-  }
-  ((void **)d->owned.item)[d->owned.count++] = item;
-  return item;
-}
-
-static int64_t put(draft *d, int64_t parent, const char *name, const char *label, const char *type, int nd, const int64_t *dim,
-                   char kind, const void *values)
-{
-  const int64_t at = d->ok ? rc_plan_add(&d->plan, parent, name, label, type, nd, dim, kind, values) : -1;
-
-  d->ok = d->ok && at >= 0;
-  return at;
-}
-
-/* Integers, as I4 where they fit. */
-static int64_t put_ints(draft *d, int64_t parent, const char *name, const char *label, int nd, const int64_t *dim,
-                        const int64_t *values)
-{
-  int64_t count = 1;
-  bool    small = true;
-
-  for (int k = 0; k < nd; k++) count *= dim[k];
-  for (int64_t i = 0; i < count; i++) small = small && values[i] >= INT32_MIN && values[i] <= INT32_MAX;
-  return put(d, parent, name, label, small ? "I4" : "I8", nd, dim, 'I', values);
-}
-
-static void put_text(draft *d, int64_t parent, const char *name, const char *label, const char *text)
-{
-  const int64_t size = (int64_t)strlen(text);
-
-  put(d, parent, name, label, "C1", 1, &size, 'C', text);
-}
-
-static void put_coordinates(draft *d, int64_t zone, const double *xyz, int64_t n, int nd, const int64_t *dim)
-{
-  static const char *const name[3] = {"CoordinateX", "CoordinateY", "CoordinateZ"};
-  const int64_t            grid    = put(d, zone, "GridCoordinates", "GridCoordinates_t", NULL, 0, NULL, 0, NULL);
-
-  for (int k = 0; k < 3; k++) {
-    double *x = own(d, n, sizeof *x);
-
-    for (int64_t i = 0; x && i < n; i++) x[i] = xyz[3 * i + k];
-    put(d, grid, name[k], "DataArray_t", "R8", nd, dim, 'R', x);
-  }
-}
-
-static void put_elements(draft *d, int64_t zone, const char *name, int64_t code, int64_t first, int64_t n,
-                         const int64_t *connectivity, const int64_t *offset)
-{
-  const int64_t two = 2, rows = n + 1, length = offset[n];
-  int64_t      *head = own(d, 4, sizeof *head);
-  int64_t       at;
-
-  if (!head) return;
-  memcpy(head, (int64_t[4]){code, 0, first, first + n - 1}, 4 * sizeof *head);
-  at = put_ints(d, zone, name, "Elements_t", 1, &two, head);
-  put_ints(d, at, "ElementRange", "IndexRange_t", 1, &two, head + 2);
-  put_ints(d, at, "ElementConnectivity", "DataArray_t", 1, &length, connectivity);
-  put_ints(d, at, "ElementStartOffset", "DataArray_t", 1, &rows, offset);
-}
-
-/* NGON_n as the mesh has its faces, NFACE_n from their owners and neighbours. */
-static void put_polyhedra(draft *d, int64_t zone, const remap_mesh *mesh)
-{
-  const int64_t n = mesh->num_faces, cells = mesh->num_cells, length = mesh->face_offset[n];
-  int64_t      *node = own(d, length, sizeof *node), *offset = own(d, cells + 1, sizeof *offset),
-          *face = own(d, 2 * n, sizeof *face);
-
-  if (!node || !offset || !face) return;
-  for (int64_t i = 0; i < length; i++) node[i] = mesh->face_node[i] + 1;
-  memset(offset, 0, ((size_t)cells + 1) * sizeof *offset);
-  for (int64_t f = 0; f < n; f++) {
-    offset[mesh->face_owner[f] + 1]++;
-    if (mesh->face_neighbour[f] >= 0) offset[mesh->face_neighbour[f] + 1]++;
-  }
-  for (int64_t c = 0; c < cells; c++) offset[c + 1] += offset[c];
-  for (int64_t f = 0; f < n; f++) { /* offset[c] runs ahead to where the next face of c goes */
-    face[offset[mesh->face_owner[f]]++] = f + 1;
-    if (mesh->face_neighbour[f] >= 0) face[offset[mesh->face_neighbour[f]]++] = -(f + 1);
-  }
-  for (int64_t c = cells; c > 0; c--) offset[c] = offset[c - 1];
-  offset[0] = 0;
-  put_elements(d, zone, "NGonElements", 22, 1, n, node, mesh->face_offset);
-  put_elements(d, zone, "NFaceElements", 23, n + 1, cells, face, offset);
-}
-
-static void put_zone(draft *d, int64_t base, const rcgns_new_zone *z, const char *solution)
-{
-  const bool    block    = z->mesh == NULL;
-  const int     nd       = block ? 3 : 1;
-  const int64_t shape[2] = {3, nd};
-  int64_t      *size = own(d, 9, sizeof *size), dim[3], cell[3], nodes = 1, zone, at;
-
-  if (!size) return;
-  memset(size, 0, 9 * sizeof *size);
-  for (int k = 0; k < nd; k++) {
-    size[k]          = block ? z->num_vertices[k] : z->mesh->num_nodes;
-    size[nd + k]     = block ? z->num_vertices[k] - 1 : z->mesh->num_cells;
-    dim[nd - 1 - k]  = size[k];
-    cell[nd - 1 - k] = size[nd + k];
-    nodes *= size[k];
-  }
-  zone = put_ints(d, base, z->name, "Zone_t", 2, shape, size);
-  put_text(d, zone, "ZoneType", "ZoneType_t", block ? "Structured" : "Unstructured");
-  put_coordinates(d, zone, block ? z->node_xyz : z->mesh->node_xyz, nodes, nd, dim);
-  if (!block) put_polyhedra(d, zone, z->mesh);
-  if (!z->num_fields) return;
-  at = put(d, zone, solution, "FlowSolution_t", NULL, 0, NULL, 0, NULL);
-  put_text(d, at, "GridLocation", "GridLocation_t", "CellCenter");
-  for (int64_t f = 0; f < z->num_fields; f++)
-    put(d, at, z->field[f].name, "DataArray_t", "R8", nd, cell, 'R', z->field[f].values);
-}
-
-static rcgns_status check_zones(const char *path, const char *solution, int64_t num_zones, const rcgns_new_zone *zones,
-                                rcgns_message *message)
-{
-  bool ok = num_zones > 0;
-
-  for (int64_t i = 0; i < num_zones; i++) {
-    const rcgns_new_zone *z = zones + i;
-
-    ok = ok && is_name(z->name) &&
-         (z->mesh ? z->mesh->num_cells > 0 : z->num_vertices[0] > 1 && z->num_vertices[1] > 1 && z->num_vertices[2] > 1);
-    ok = ok && (!z->num_fields || is_name(solution));
-    for (int64_t f = 0; f < z->num_fields; f++) ok = ok && is_name(z->field[f].name);
-  }
-  return ok ? RCGNS_OK
-            : rc_fail(message, RCGNS_USAGE, "%s: zones need names of 1 to 32 characters and cells, fields a solution", path);
-}
-
-rcgns_status rcgns_create(const char *path, double version, const char *solution, int64_t num_zones,
-                          const rcgns_new_zone *zones, rcgns_message *message)
-{
-  static const int64_t one = 1, two = 2, dimensions[2] = {3, 3};
-  draft                d              = {.ok = true};
-  char                 part[PATH_MAX] = "";
-  int64_t              base;
-  rcgns_status         status = check_zones(path, solution, num_zones, zones, message);
-
-  if (status != RCGNS_OK) return status;
-  put(&d, -1, "CGNSLibraryVersion", "CGNSLibraryVersion_t", "R4", 1, &one, 'R', &version);
-  base = put_ints(&d, -1, "Base", "CGNSBase_t", 1, &two, dimensions);
-  for (int64_t i = 0; i < num_zones; i++) put_zone(&d, base, zones + i, solution);
-  status = d.ok ? begin(&d.plan, path, part, sizeof part, message) : rc_no_memory(message);
-  if (status == RCGNS_OK) status = finish(part, path, message);
-  if (status != RCGNS_OK && *part) unlink(part);
-  if (status == RCGNS_OK) message->text[0] = 0;
-  rc_plan_drop(&d.plan);
-  for (int64_t i = 0; i < d.owned.count; i++) free(((void **)d.owned.item)[i]);
-  rc_drop(&d.owned);
   return status;
 }

@@ -2,6 +2,8 @@
  * up to 3.4, so newer stamps are replaced in copies. One rank. */
 #include "files.h"
 
+#include "../slices/blocks.h"
+
 #include <hdf5.h>
 
 /* Lines of complaint about a file; the caller frees. NULL: there is no cgnscheck. */
@@ -191,5 +193,23 @@ static void files_of_the_newest_hdf5_format_are_read(void)
   tm_free(whole);
 }
 
+static void supermeshes_have_no_error(void)
+{
+  bl_blocks    *b = bl_new((int[]){3, 2, 4}, 0, 1);
+  rcgns_message why;
+  char          path[64], *found;
+
+  cf_path(path, "super_checked");
+  RT_EQ(rcgns_write_supermesh(MPI_COMM_SELF, path, 3.4, &b->content, &why), RCGNS_OK);
+  found = complaints(path);
+  if (!found)
+    rt_skip("cgnscheck is not installed");
+  else if (!RT_EQ(strlen(found), 0))
+    printf("# %s\n", found);
+  free(found);
+  cf_remove(path);
+  bl_free(b);
+}
+
 RT_MAIN(RT_CASE(files_of_the_newest_hdf5_format_are_read), RT_CASE(outputs_on_real_targets_add_no_error),
-        RT_CASE(new_files_have_no_error))
+        RT_CASE(new_files_have_no_error), RT_CASE(supermeshes_have_no_error))
