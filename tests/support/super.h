@@ -14,7 +14,8 @@
 enum { SUPER_WHOLE_SOURCE = REMAP_IN_BOTH | REMAP_IN_SOURCE, SUPER_UNION = SUPER_WHOLE_SOURCE | REMAP_IN_TARGET };
 
 typedef struct super {
-  laid           *l;
+  laid             *l;
+  const rm_trimesh *mesh[2]; /* without flat triangles */
   const rm_cells *cells;
   remap_status    status;
 } super;
@@ -22,9 +23,15 @@ typedef struct super {
 static inline super super_of(const tm_mesh *source, const tm_mesh *target, remap_faces faces, const laid_how *how, int keep)
 {
   const rm_cells_choice choice = {.keep = keep};
-  super                 s      = {laid_over(source, target, faces, how), NULL, REMAP_OK};
+  super                 s      = {.l = laid_over(source, target, faces, how)};
+  const rm_overlay     *o      = s.l->overlay;
 
-  s.status = s.l->status == REMAP_OK ? rm_cells_build(s.l->arena, &s.l->part, s.l->overlay, &choice, &s.cells, &s.l->reason) : s.l->status;
+  s.status = s.l->status;
+  for (int side = 0; side < 2 && s.status == REMAP_OK; side++)
+    s.status = rm_cells_mesh(s.l->arena, &s.l->frame, s.l->mesh[side], &s.mesh[side]);
+  if (s.status == REMAP_OK && (s.mesh[0] != s.l->mesh[0] || s.mesh[1] != s.l->mesh[1]))
+    s.status = rm_overlay_build(s.l->arena, s.mesh, &s.l->part, NULL, &o, &s.l->reason);
+  if (s.status == REMAP_OK) s.status = rm_cells_build(s.l->arena, &s.l->part, o, &choice, &s.cells, &s.l->reason);
   return s;
 }
 
@@ -76,7 +83,7 @@ static inline void super_check_volumes(const super *s)
 static inline void super_faces_are_covered_(const super *s)
 {
   for (int side = 0; side < 2; side++) {
-    const rm_trimesh *m   = s->l->mesh[side];
+    const rm_trimesh *m   = s->mesh[side];
     const rm_lid      n   = s->l->part.piece[side].num_faces;
     double           *sum = tm_alloc_(n, sizeof *sum), *area = tm_alloc_(n, sizeof *area), worst = 0;
 

@@ -51,10 +51,15 @@ typedef struct rm_cells {
   double         seconds_polygons, seconds_glue, seconds_faces;
 } rm_cells;
 
+/* The triangulation without flat triangles, which have their corners on a line: they are left out, and others are cut where such
+ * a one had a vertex on their edge, so that what is left is conformal and bounds the same volumes. *out is mesh itself if it has
+ * none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */
+remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out);
+
 /* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
  * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH with the
- * reason if cells of one mesh overlap or cross each other, or if a triangle of a face has no area: see rm_cells_mesh. O(n log n) in
- * crossings, n^2 in the vertices of a face with holes. */
+ * reason if cells of one mesh overlap or cross each other. The meshes of the overlay have no flat triangles: see rm_cells_mesh.
+ * O(n log n) in crossings, n^2 in the vertices of a face with holes. */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_cells_choice *choice,
                             const rm_cells **out, rm_reason *reason);
 

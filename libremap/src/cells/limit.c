@@ -38,23 +38,10 @@ static inline const double *corner(const rm_trimesh *m, rm_lid t, int h) { retur
 
 /* ---- triangles that lie on each other ------------------------------------------------------------------------------ */
 
-static bool has_area(const rm_trimesh *m, rm_lid t)
-{
-  double o[3];
-  return rm_off_plane(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), o);
-}
-
 static remap_status overlapping(const builder *b, int side, rm_lid cell)
 {
   return rm_fail(REMAP_BAD_MESH, b->reason, side, cell >= 0 ? b->part->piece[side].cell_global[cell] : -1,
                  "this cell overlaps another of its mesh; a supermesh needs cells that do not");
-}
-
-static remap_status without_area(const builder *b, int side, rm_lid t)
-{
-  const rm_lid *cell = b->l->o->mesh[side]->side[t], c = cell[0] >= 0 ? cell[0] : cell[1];
-  return rm_fail(REMAP_BAD_MESH, b->reason, side, c >= 0 ? b->part->piece[side].cell_global[c] : -1,
-                 "a face of this cell has three corners on a line and no area between them; a supermesh needs faces with area");
 }
 
 /* The sides of triangles first..last - 1, which lie on each other, less the cells that are on both. */
@@ -91,7 +78,7 @@ static remap_status join_copies(builder *b, int side)
   for (rm_lid t = 0, last; t < m->num_triangles; t = last) {
     for (last = t + 1; last < m->num_triangles && !memcmp(m->triangle[last], m->triangle[t], sizeof *m->triangle);) last++;
     rm_lid net[2] = {RM_OUTSIDE, RM_OUTSIDE};
-    if (!has_area(m, t)) return without_area(b, side, t);
+    RM_ASSERT(rm_has_area(m, t));
     RM_TRY(net_sides(b, side, t, last, net));
     for (rm_lid s = t; s < last; s++) first[s] = t, memcpy(cell[s], net, sizeof net);
     for (int h = 0; h < 3 && net[0] != net[1]; h++) b->edge_present[side][m->triangle_edge[t][h]] = 1;

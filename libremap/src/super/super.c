@@ -41,6 +41,7 @@ static remap_status make_cells(work *w, rm_reason *reason)
 
   for (int side = 0; side < 2; side++) {
     RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &mesh[side]));
+    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, mesh[side], &mesh[side]));
     w->figures.num_triangles[side] = mesh[side]->num_triangles;
   }
   w->figures.seconds_triangulation = rm_seconds() - start;
