@@ -2,6 +2,7 @@
  *
  *   warped       N^3 warped hexahedra, rotated, inside (2N)^3 larger by two: those of overlay_floor.c
  *   general      N^3 warped hexahedra on (N+1)^3, warped differently: one target cell per source cell
+ *   finer        likewise on (2N)^3
  *   identical    N^3 warped hexahedra on themselves          nested     N^3 boxes on (2N)^3
  *   shifted      N^3 boxes, half a cell apart                abutting   N^3 boxes beside N^3 boxes
  *   boxes        N^3 boxes, rotated, inside (2N)^3           tetrahedra 6 N^3, warped, rotated, inside 6 (2N)^3
@@ -17,7 +18,7 @@
 #include <time.h>
 #include "meshes.h"
 
-#define BENCH_CASES "warped|general|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer"
+#define BENCH_CASES "warped|general|finer|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer"
 
 /* ---- clocks ------------------------------------------------------------------------------------------------------ */
 
@@ -138,11 +139,12 @@ static inline void bench_thin_(double xyz[3], const void *data)
 
 typedef tm_mesh *bench_maker_(const int n[3], tm_map map, const void *data);
 
-/* N^3 hexahedra on (N+1)^3, warped differently, then moved by a map (NULL: stay). */
-static inline void bench_general_(int n, tm_map map, tm_mesh *mesh[2])
+/* N^3 hexahedra on M^3, warped differently, then moved by a map (NULL: stay). */
+static inline void bench_general_(int n, int m, tm_map map, tm_mesh *mesh[2])
 {
   for (int side = 0; side < 2; side++) {
-    mesh[side] = tm_hexahedra((int[]){n + side, n + side, n + side}, tm_warp, &(tm_warping){.03, side ? .1 : .7});
+    const int size = side ? m : n;
+    mesh[side] = tm_hexahedra((int[]){size, size, size}, tm_warp, &(tm_warping){.03, side ? .1 : .7});
     if (map) tm_move(mesh[side], map, NULL);
   }
 }
@@ -168,13 +170,13 @@ static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
   } else if (!strcmp(name, "tetrahedra") || !strcmp(name, "dual")) {
     bench_maker_ *make = name[0] == 't' ? tm_tetrahedra : tm_dual;
     mesh[0] = bench_placed_(make(coarse, tm_warp, &first), .3, .5), mesh[1] = bench_placed_(make(fine, tm_warp, &second), 0, 1);
-  } else if (!strcmp(name, "general")) {
-    bench_general_(n, NULL, mesh);
+  } else if (!strcmp(name, "general") || !strcmp(name, "finer")) {
+    bench_general_(n, name[0] == 'g' ? n + 1 : 2 * n, NULL, mesh);
   } else if (!strcmp(name, "pancakes")) {
-    bench_general_(n, bench_thin_, mesh);
+    bench_general_(n, n + 1, bench_thin_, mesh);
     for (int side = 0; side < 2; side++) bench_placed_(mesh[side], .3, 1);
   } else if (!strcmp(name, "graded") || !strcmp(name, "layer")) {
-    bench_general_(n, name[0] == 'g' ? bench_grade_ : bench_layer_, mesh);
+    bench_general_(n, n + 1, name[0] == 'g' ? bench_grade_ : bench_layer_, mesh);
   } else {
     return false;
   }

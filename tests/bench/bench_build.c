@@ -1,42 +1,65 @@
-/* bench_build -- time of a whole remap_build and of one remap_field on the meshes of bench_overlay, on any number of ranks. Cells
- * are dealt in slabs. One JSON line.
+/* bench_build -- a whole remap_build and one remap_field on the meshes of bench.h, on any number of ranks; cells are dealt in slabs.
+ * One JSON line: medians of wall clock; bytes of heap that the library holds at the peak of remap_build, and afterwards, per target
+ * cell; how far the resident size grew above that of the meshes; bytes of the plan per pair: pairs, V and M of both directions.
  *
- *   mpirun -n P bench_build N NB SCALE diagonal|centre [REPEATS] */
+ *   mpirun -n P bench_build CASE N diagonal|centre [REPEATS] */
 #include <remap/remap.h>
-#include <stdio.h>
-#include <sys/resource.h>
-#include "meshes.h"
+#include "bench.h"
 
-static int by_value(const void *a, const void *b)
+typedef struct times {
+  double *build, *cpu, *partition, *overlay, *field; /* [repeats] */
+} times;
+
+static remap_status one_field(remap_context *ctx, const double *u, double *v)
 {
-  const double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
+  remap_field_desc one = {.name = "u", .nature = REMAP_CONSERVED, .in = u, .out = v};
+  return remap_field(ctx, REMAP_FORWARD, NULL, 1, &one, NULL);
 }
 
-static double median(double *x, int n)
+/* Build once, and transfer a field twice: the first time prepares the stencils. */
+static remap_status measure(remap_context *ctx, const double *u, double *v, int r, const times *t, remap_stats *stats)
 {
-  qsort(x, (size_t)n, sizeof *x, by_value);
-  return x[n / 2];
+  remap_status status;
+
+  MPI_Barrier(MPI_COMM_WORLD);
+  const double start = MPI_Wtime(), cpu = bench_cpu();
+  status             = remap_build(ctx);
+  if (status != REMAP_OK) return status;
+  t->build[r] = MPI_Wtime() - start;
+  t->cpu[r]   = bench_cpu() - cpu;
+  remap_get_stats(ctx, stats);
+  t->partition[r] = stats->seconds_partition;
+  t->overlay[r]   = stats->seconds_overlay;
+  status          = one_field(ctx, u, v);
+  MPI_Barrier(MPI_COMM_WORLD);
+  const double begin = MPI_Wtime();
+  if (status == REMAP_OK) status = one_field(ctx, u, v);
+  t->field[r] = MPI_Wtime() - begin;
+  return status;
+}
+
+static double largest(double x)
+{
+  MPI_Allreduce(MPI_IN_PLACE, &x, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+  return x;
 }
 
 int main(int argc, char **argv)
 {
-  int rank, size;
+  const int     repeats = argc > 4 ? atoi(argv[4]) : 1, faces = argc > 3 ? bench_faces(argv[3]) : -1;
+  int           rank, size;
+  tm_mesh      *whole[2], *mine[2];
+  int64_t       cells[2];
+  remap_options options;
+  remap_context *ctx = NULL;
+  remap_stats   stats = {0};
+  remap_status  status;
 
   MPI_Init(&argc, &argv);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &size);
-  if (argc < 5) return fprintf(stderr, "usage: bench_build N NB SCALE diagonal|centre [REPEATS]\n"), MPI_Finalize(), 2;
-
-  const int       repeats = argc > 5 ? atoi(argv[5]) : 1;
-  tm_mesh        *whole[2] = {tm_benchmark(atoi(argv[1]), 0.7, 0.3, atof(argv[3])), tm_benchmark(atoi(argv[2]), 0.1, 0, 1)}, *mine[2];
-  double         *wall = tm_alloc_(4 * repeats, sizeof *wall), *partition = wall + repeats, *overlay = partition + repeats, *field = overlay + repeats;
-  remap_options   options;
-  remap_context  *ctx = NULL;
-  remap_stats     stats;
-  int64_t         cells[2];
-  remap_status    status;
-
+  if (faces < 0 || atoi(argv[2]) < 1 || repeats < 1 || !bench_meshes(argv[1], atoi(argv[2]), whole))
+    return fprintf(stderr, "usage: bench_build " BENCH_CASES " N diagonal|centre [REPEATS]\n"), MPI_Finalize(), 2;
   for (int side = 0; side < 2; side++) {
     int *deal   = tm_deal(whole[side], size, TM_SLABS, 0);
     mine[side]  = tm_part(whole[side], deal, rank, 0);
@@ -44,45 +67,33 @@ int main(int argc, char **argv)
     tm_free(whole[side]);
     free(deal);
   }
+  double     *time = tm_alloc_(5 * repeats, sizeof *time);
+  const times t    = {time, time + repeats, time + 2 * repeats, time + 3 * repeats, time + 4 * repeats};
+  double     *u = tm_alloc_(mine[0]->view.num_cells, sizeof *u), *v = tm_alloc_(mine[1]->view.num_cells, sizeof *v);
+
   remap_options_default(&options);
-  options.faces = strcmp(argv[4], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE;
+  options.faces = (remap_faces)faces;
   status        = remap_create(MPI_COMM_WORLD, &options, &ctx);
   for (int side = 0; side < 2 && status == REMAP_OK; side++) status = remap_set_mesh(ctx, side, &mine[side]->view);
-  double *u = tm_alloc_(mine[0]->view.num_cells, sizeof *u), *v = tm_alloc_(mine[1]->view.num_cells, sizeof *v);
+  const double held = bench_heap_start();
+  double       peak = 0, kept = 0;
   for (int r = 0; r < repeats && status == REMAP_OK; r++) {
-    MPI_Barrier(MPI_COMM_WORLD);
-    const double start = MPI_Wtime();
-    status             = remap_build(ctx);
-    if (status != REMAP_OK) break;
-    wall[r] = MPI_Wtime() - start;
-    remap_get_stats(ctx, &stats);
-    partition[r] = stats.seconds_partition;
-    overlay[r]   = stats.seconds_overlay;
-    remap_field_desc one = {.name = "u", .nature = REMAP_CONSERVED, .in = u, .out = v};
-    status               = remap_field(ctx, REMAP_FORWARD, NULL, 1, &one, NULL); /* prepares the stencils */
-    MPI_Barrier(MPI_COMM_WORLD);
-    const double begin = MPI_Wtime();
-    if (status == REMAP_OK) status = remap_field(ctx, REMAP_FORWARD, NULL, 1, &one, NULL);
-    field[r] = MPI_Wtime() - begin;
+    status = measure(ctx, u, v, r, &t, &stats);
+    if (r == 0) peak = bench_heap_peak() - held, kept = bench_heap_now() - held;
   }
-  if (status != REMAP_OK) {
-    if (rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(ctx));
-  } else {
-    struct rusage usage;
-    double        peak;
-    getrusage(RUSAGE_SELF, &usage);
-    peak = (double)usage.ru_maxrss * 1024;
-    MPI_Allreduce(MPI_IN_PLACE, &peak, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
-    if (rank == 0)
-      printf("{\"bench\":\"build\",\"ranks\":%d,\"faces\":\"%s\",\"cells\":[%lld,%lld],\"pairs\":%lld,\"closure\":[%.1e,%.1e],\"seconds_build\":%.3f,"
-             "\"seconds_partition\":%.3f,\"seconds_overlay\":%.3f,\"us_build_per_source_cell\":%.2f,\"seconds_field\":%.4f,\"peak_rss_bytes_max\":%.0f}\n",
-             size, argv[4], (long long)cells[0], (long long)cells[1], (long long)stats.pairs, stats.max_closure_error[0], stats.max_closure_error[1],
-             median(wall, repeats), median(partition, repeats), median(overlay, repeats), 1e6 * median(wall, repeats) / (double)cells[0],
-             median(field, repeats), peak);
-  }
+  if (status != REMAP_OK && rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(ctx));
+  peak = largest(peak) * size, kept = largest(kept) * size;
+  if (status == REMAP_OK && rank == 0)
+    printf("{\"bench\":\"build\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"faces\":\"%s\",\"cells\":[%lld,%lld],\"pairs\":%lld,\"closure\":[%.1e,%.1e],"
+           "\"seconds_build\":%.3f,\"seconds_cpu\":%.3f,\"seconds_partition\":%.3f,\"seconds_overlay\":%.3f,\"us_build_per_source_cell\":%.2f,"
+           "\"seconds_field\":%.4f,\"peak_bytes_per_target_cell\":%.0f,\"kept_bytes_per_target_cell\":%.0f,\"peak_rss_bytes\":%.0f}\n",
+           argv[1], argv[2], size, argv[3], (long long)cells[0], (long long)cells[1], (long long)stats.pairs, stats.max_closure_error[0],
+           stats.max_closure_error[1], bench_median(t.build, repeats), bench_median(t.cpu, repeats), bench_median(t.partition, repeats),
+           bench_median(t.overlay, repeats), 1e6 * bench_median(t.cpu, repeats) / (double)cells[0], bench_median(t.field, repeats),
+           peak / (double)cells[1], kept / (double)cells[1], bench_rss_bytes());
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
-  free(u), free(v), free(wall);
+  free(u), free(v), free(time);
   MPI_Finalize();
   return status != REMAP_OK;
 }
