@@ -20,6 +20,9 @@ bool rm_geom_selftest(void);
 /* Sign of det[b - a, c - a, d - a], no simulation of simplicity. */
 int rm_orient3d(const double a[3], const double b[3], const double c[3], const double d[3]);
 
+/* Sign of component `axis` of (a1 - a0) x (b1 - b0), likewise. */
+int rm_cross_sign(const double a0[3], const double a1[3], const double b0[3], const double b1[3], int axis);
+
 /* Side of point p against the triangle's plane: sign of n.(p - t0), n = (t1 - t0) x (t2 - t0); if zero, -moved times the first
  * non-zero component of n; 0 only if n = 0. *degenerate (may be NULL) is set if the determinant itself was zero. */
 int rm_point_side(const double t0[3], const double t1[3], const double t2[3], const double p[3], int moved, bool *degenerate);

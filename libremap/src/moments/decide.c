@@ -1,15 +1,21 @@
-/* decide -- does a pair have volume, does a skin pass through it: exact answers where rounding leaves a doubt (DESIGN 2.6). */
+/* decide -- does a pair have volume: the exact answer where rounding leaves a doubt (DESIGN 2.6).
+ *
+ * In the limit, without simulation of simplicity, the triangles of i and j leave polygons that bound i n j, or what both
+ * wind about. The volume is the sum over all planes of height times net area of the polygons in the plane. So polygons that
+ * cancel in their plane can go: mostly their sides are the same but for their direction; what is left of a plane has no net
+ * area, or has. A body has faces in four planes at least; where fewer are left there is none. Where four or more are left,
+ * the sum is taken exactly.
+ *
+ * All of it holds for any cells, inverted and tangled ones too. O(sides log sides) where the sides cancel, which they do on
+ * identical, nested and abutting meshes; exact sums cost as rational.c says. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
-#include "geom/exact.h"
 #include "moments/moments_private.h"
 
-/* ---- does a pair have volume, does a skin pass through it (DESIGN 2.6) ------------------------------------------------- */
+/* ---- what rounding decides ----------------------------------------------------------------------------------------------- */
 
-static double largest_extent(const double box[6])
-{
-  return fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-}
+static double largest_extent(const double box[6]) { return fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])); }
 
 /* Extent of what the pair's points are computed from: edges and faces of i, of j. */
 static double operand_extent(const work *w, rm_lid i, const slot *s)
@@ -18,41 +24,21 @@ static double operand_extent(const work *w, rm_lid i, const slot *s)
   return (s->kinds & (FROM_SOURCE | FROM_BOTH) ? a : 0) + (s->kinds & (FROM_TARGET | FROM_BOTH) ? b : 0) + s->reach;
 }
 
-/* Forward error of 6 V: in units of u = 2^-53, a point errs by 4 extents, a plane's height by 6, a cone's double area by 3 sqrt(3)
- * reach^2 at most: together less than 2^7 extent reach^2 per cone. */
+/* Forward error of 6 V: in units of u = 2^-53, a point errs by 4 extents, a plane's height by 6, a cone's double area by 3
+ * sqrt(3) reach^2 at most: together less than 2^7 extent reach^2 per cone. */
 double rm_moments_noise(const work *w, rm_lid i, const slot *s)
 {
   return 0x1p-46 * (s->num_cones + 1) * s->reach * s->reach * operand_extent(w, i, s);
 }
 
-/* The polygon has area beyond rounding: its points err by 4 extents, in units of u, however small it is itself. */
-static bool has_area(const work *w, rm_lid i, const slot *s, const polygon *g)
+bool rm_moments_has_area(const work *w, rm_lid i, const slot *s, const polygon *g)
 {
-  const double *n = w->o->mesh[g->mesh]->normal[g->triangle];
+  const double *n      = w->o->mesh[g->mesh]->normal[g->triangle];
   const double  length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
   return fabs(g->area) > 0x1p-46 * (g->num_cones + 1) * g->reach * operand_extent(w, i, s) * length;
 }
 
-static bool coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
-{
-  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
-  const rm_lid     *v = m->triangle[a];
-
-  for (int c = 0; c < 3; c++)
-    if (rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], k->vertex[k->triangle[b][c]]) != 0) return false;
-  return true;
-}
-
-/* +1 if the normals of triangles a and b out of their cells, cell[mesh], point the same way, -1 if opposite; means something for
- * coplanar ones. */
-static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int mesh_b, rm_lid b)
-{
-  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
-  const double     *n = m->normal[a], *o = k->normal[b];
-  const bool        flip = (m->side[a][0] == cell[mesh_a]) != (k->side[b][0] == cell[mesh_b]);
-
-  return (n[0] * o[0] + n[1] * o[1] + n[2] * o[2] > 0) != flip ? 1 : -1;
-}
+static bool is_same(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
 
 /* ---- limits: where the crossings are without simulation of simplicity ---------------------------------------------------- */
 
@@ -60,72 +46,57 @@ static int facing(const work *w, const rm_lid cell[2], int mesh_a, rm_lid a, int
 enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2 };
 
 /* AT_END + h if that end lies in the triangle's plane, AT_CORNER + h if that corner lies on the edge's line. */
-static int find_limit(const rm_overlay *o, const corner *c)
+static int find_limit(const double *const p[2], const double *const v[3])
 {
-  const rm_trimesh *own = o->mesh[c->mesh], *other = o->mesh[1 - c->mesh];
-  const rm_lid     *t = other->triangle[c->triangle];
-  const double     *p[2], *v[3];
-  bool              on[3];
+  bool on[2]; /* meets the line through corners h and h + 1 */
 
-  for (int h = 0; h < 3; h++) v[h] = other->vertex[t[h]];
-  for (int h = 0; h < 2; h++) {
-    p[h] = own->vertex[own->edge[c->edge][h]];
+  for (int h = 0; h < 2; h++)
     if (rm_orient3d(v[0], v[1], v[2], p[h]) == 0) return AT_END + h;
-  }
-  for (int h = 0; h < 3; h++) (void)rm_edge_side(p[0], p[1], v[h], v[(h + 1) % 3], 1, &on[h]);
-  for (int h = 0; h < 3; h++)
-    if (on[h] && on[(h + 1) % 3]) return AT_CORNER + (h + 1) % 3;
-  return AT_NOTHING;
+  for (int h = 0; h < 2; h++) on[h] = rm_orient3d(p[0], p[1], v[h], v[h + 1]) == 0;
+  if (on[0] && on[1]) return AT_CORNER + 1;
+  if ((!on[0] && !on[1]) || rm_orient3d(p[0], p[1], v[2], v[0]) != 0) return AT_NOTHING;
+  return on[0] ? AT_CORNER : AT_CORNER + 2;
 }
 
-/* The vertex at which a corner lies exactly, NULL if it lies at none. A crossing is a corner of many polygons: its answer is kept. */
-static const double *limit_vertex(const work *w, const corner *c)
+/* Give a locus its vertex, if it has one. A crossing is the end of many sides: its answer is kept. */
+static void settle_locus(const work *w, locus *l)
 {
-  const rm_trimesh *own = w->o->mesh[c->mesh], *other = w->o->mesh[1 - c->mesh];
+  if (l->crossing < 0) return;
+  const rm_trimesh  *own = w->o->mesh[l->mesh], *other = w->o->mesh[1 - l->mesh];
+  const rm_crossing *x = &w->o->trace[l->mesh].crossing[l->crossing];
+  const rm_lid      *e = own->edge[x->edge], *t = other->triangle[x->triangle / 2];
+  uint8_t           *at = &w->limit[l->mesh][l->crossing];
 
-  if (c->edge < 0) return c->vertex;
-  uint8_t *at = &w->limit[c->mesh][c->crossing];
-  if (!*at) *at = (uint8_t)find_limit(w->o, c);
-  if (*at == AT_NOTHING) return NULL;
-  return *at < AT_CORNER ? own->vertex[own->edge[c->edge][*at - AT_END]] : other->vertex[other->triangle[c->triangle][*at - AT_CORNER]];
+  if (!*at)
+    *at = (uint8_t)find_limit((const double *const[2]){own->vertex[e[0]], own->vertex[e[1]]},
+                              (const double *const[3]){other->vertex[t[0]], other->vertex[t[1]], other->vertex[t[2]]});
+  if (*at != AT_NOTHING) l->vertex = *at < AT_CORNER ? own->vertex[e[*at - AT_END]] : other->vertex[t[*at - AT_CORNER]];
 }
 
-/* The projection of a corner's limit along axis k in homogeneous coordinates (x, y, w): for a crossing of p0 + lambda u, lambda =
- * N / D, the integers (D p0 + N u, D). Coordinates count in units of 2^-scale. */
-static void homogeneous(const rm_overlay *o, const corner *c, const double *vertex, int k, int scale, rm_int out[3])
+static bool is_same_locus(const locus *a, const locus *b)
 {
-  const int axis[2] = {(k + 1) % 3, (k + 2) % 3};
-
-  if (vertex) {
-    for (int h = 0; h < 2; h++) rm_int_from_double(&out[h], vertex[axis[h]], scale);
-    rm_int_from_double(&out[2], 1, 0);
-    return;
-  }
-  const rm_trimesh *own = o->mesh[c->mesh], *other = o->mesh[1 - c->mesh];
-  const rm_lid     *t = other->triangle[c->triangle];
-  const double     *p0 = own->vertex[own->edge[c->edge][0]], *p1 = own->vertex[own->edge[c->edge][1]], *t0 = other->vertex[t[0]];
-  rm_int            u[3], a[3], b[3], n[3], down[3], up, product, x;
-
-  for (int d = 0; d < 3; d++) {
-    rm_int_from_difference(&u[d], p1[d], p0[d], scale);
-    rm_int_from_difference(&a[d], other->vertex[t[1]][d], t0[d], scale);
-    rm_int_from_difference(&b[d], other->vertex[t[2]][d], t0[d], scale);
-    rm_int_from_difference(&down[d], t0[d], p0[d], scale);
-  }
-  rm_int_cross(n, a, b);
-  rm_int_dot(&up, n, down);
-  rm_int_dot(&out[2], n, u);
-  for (int h = 0; h < 2; h++) {
-    rm_int_from_double(&x, p0[axis[h]], scale);
-    rm_int_mul(&out[h], &out[2], &x);
-    rm_int_mul(&product, &up, &u[axis[h]]);
-    rm_int_add(&out[h], &out[h], &product);
-  }
+  if (a->vertex || b->vertex) return a->vertex && b->vertex && is_same(a->vertex, b->vertex);
+  return a->crossing == b->crossing && a->mesh == b->mesh;
 }
 
-static bool is_same(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
+void rm_moments_settle(work *w, polygon *g)
+{
+  int *link = &g->first_side;
 
-/* ---- polygons, found by pair and triangle ---------------------------------------------------------------------------------- */
+  for (int k = *link; k >= 0 && !g->is_settled; k = *link) {
+    polygon_side *s = &w->side[k];
+
+    settle_locus(w, &s->from);
+    settle_locus(w, &s->to);
+    if (is_same_locus(&s->from, &s->to))
+      *link = s->next;
+    else
+      link = &s->next;
+  }
+  g->is_settled = true;
+}
+
+/* ---- polygons, found by pair and triangle -------------------------------------------------------------------------------- */
 
 enum { FEW_BUCKETS = 256 };
 
@@ -141,7 +112,7 @@ static remap_status set_buckets(work *w, int num)
   w->num_buckets = num;
   for (int b = 0; b < num; b++) w->bucket[b] = -1;
   for (int k = 0; k < w->num_polygons; k++) {
-    int *bucket = &w->bucket[bucket_of(w, w->polygon[k].target, w->polygon[k].mesh, w->polygon[k].triangle)];
+    int *bucket         = &w->bucket[bucket_of(w, w->polygon[k].target, w->polygon[k].mesh, w->polygon[k].triangle)];
     w->polygon[k].chain = *bucket;
     *bucket             = k;
   }
@@ -150,16 +121,16 @@ static remap_status set_buckets(work *w, int num)
 
 remap_status rm_moments_no_polygons(work *w)
 {
-  w->num_polygons = w->num_corners = 0;
+  w->num_polygons = w->num_sides = 0;
   return set_buckets(w, FEW_BUCKETS);
 }
 
 /* The polygon of a pair in a plane, a new one if it has none yet. NULL: w->status tells. */
 static polygon *find_polygon(work *w, slot *s, const plane *pl)
 {
-  polygon *g;
+  polygon *g = s->last_polygon >= 0 ? &w->polygon[s->last_polygon] : NULL;
 
-  if (pl->mesh == 0 && s->last_polygon >= 0 && w->polygon[s->last_polygon].triangle == pl->triangle) return &w->polygon[s->last_polygon];
+  if (g && pl->mesh == 0 && g->triangle == pl->triangle) return g;
   for (int k = w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)]; k >= 0; k = w->polygon[k].chain) {
     g = &w->polygon[k];
     if (g->triangle == pl->triangle && g->mesh == pl->mesh && g->target == s->target) return g;
@@ -168,21 +139,26 @@ static polygon *find_polygon(work *w, slot *s, const plane *pl)
   if ((w->status = rm_grow(&w->polygon, &w->polygon_room, w->num_polygons + 1, sizeof *w->polygon)) != REMAP_OK) return NULL;
   int *bucket = &w->bucket[bucket_of(w, s->target, pl->mesh, pl->triangle)];
   g           = &w->polygon[w->num_polygons];
-  *g = (polygon){.next = s->first_polygon, .chain = *bucket, .target = s->target, .mesh = pl->mesh, .triangle = pl->triangle, .first_corner = -1};
+  *g          = (polygon){.next       = s->first_polygon,
+                          .chain      = *bucket,
+                          .target     = s->target,
+                          .mesh       = pl->mesh,
+                          .triangle   = pl->triangle,
+                          .first_side = -1};
   if (pl->mesh == 0) s->last_polygon = w->num_polygons;
   *bucket = s->first_polygon = w->num_polygons++;
   return g;
 }
 
-/* The polygon's area, for pairs that are in doubt. */
+static locus locus_of(const point *p) { return (locus){p->edge < 0 ? p->base : NULL, p->mesh, p->crossing}; }
+
+/* The polygon's rounded area and its sides, for pairs that are in doubt, and for skins. */
 static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, const point *p, const point *q)
 {
   slot         *s = &w->slots[w->slot_of[j]];
   const double *n = pl->n;
-  const point  *start = sign > 0 ? p : q, *end = sign > 0 ? q : p; /* going round the polygon */
   double        a[3], b[3];
   polygon      *g;
-  corner       *c;
 
   if (s->first_polygon == NO_POLYGONS || w->status != REMAP_OK) return;
   if (!(s->kinds & IN_DOUBT) && !w->o->mesh[pl->mesh]->triangle_is_skin[pl->triangle]) return;
@@ -195,211 +171,205 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
     b[d] -= g->first[d];
     g->reach = fmax(g->reach, fmax(fabs(a[d]), fabs(b[d])));
   }
-  if ((w->status = rm_grow(&w->corner, &w->corner_room, w->num_corners + 2, sizeof *w->corner)) != REMAP_OK) return;
-  c    = &w->corner[w->num_corners];
-  c[0] = (corner){g->first_corner, start->mesh, start->edge, start->triangle, start->crossing, start->base};
-  c[1] = (corner){-1, end->mesh, end->edge, end->triangle, end->crossing, end->base};
-  g->first_corner = w->num_corners;
-  w->num_corners += 2;
-  g->area += sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
+  g->area +=
+      sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));
   g->num_cones++;
+  if ((w->status = rm_grow(&w->side, &w->side_room, w->num_sides + 1, sizeof *w->side)) != REMAP_OK) return;
+  w->side[w->num_sides] = (polygon_side){g->first_side, (int)sign, locus_of(p), locus_of(q), pl->v};
+  g->first_side         = w->num_sides++;
 }
 
-void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p,
+                            const point *q)
 {
   (void)i, (void)kind;
   for (int h = 0; h < 2; h++)
     if (j[h] >= 0) add_polygon_side(w, j[h], h ? -sign : sign, pl, p, q);
 }
 
-/* The axis along which the polygon's triangle is largest. */
-static int longest_axis(const work *w, const polygon *g)
+/* ---- sides that cancel --------------------------------------------------------------------------------------------------- */
+
+static uint64_t locus_key(const locus *p)
 {
-  const double *n = w->o->mesh[g->mesh]->normal[g->triangle];
-  const int     k = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
-  return fabs(n[2]) > fabs(n[k]) ? 2 : k;
+  return p->vertex ? rm_hash_point(p->vertex) : rm_hash_word(2 * (uint64_t)p->crossing + (uint64_t)p->mesh);
 }
 
-/* All corners of a polygon have their limits on one line. Exact. */
-static bool is_line(const work *w, const polygon *g)
+/* +1: the same side, -1: the same but for its direction, 0: another one. */
+static int compare_sides(const polygon_side *a, const polygon_side *b)
+{
+  if (is_same_locus(&a->from, &b->from) && is_same_locus(&a->to, &b->to)) return 1;
+  return is_same_locus(&a->from, &b->to) && is_same_locus(&a->to, &b->from) ? -1 : 0;
+}
+
+enum { FEW = 24 };
+
+static remap_status sort_keys(work *w, int n)
+{
+  if (n > FEW) {
+    RM_TRY(rm_grow(&w->spare, &w->spare_room, n, sizeof *w->spare));
+    rm_sort_keyed(w->key, w->spare, n);
+    return REMAP_OK;
+  }
+  for (int i = 1; i < n; i++) {
+    const rm_keyed x = w->key[i];
+    int            k = i;
+    for (; k > 0 && w->key[k - 1].key > x.key; k--) w->key[k] = w->key[k - 1];
+    w->key[k] = x;
+  }
+  return REMAP_OK;
+}
+
+/* Of n sides of one plane, leave in list those that do not cancel; their number, -1 if memory ran out. Sides that count
+ * equally often one way as the other stand side by side once they are sorted by what does not tell their directions. */
+static int cancel(work *w, int *list, int n)
+{
+  int left = 0;
+
+  if ((w->status = rm_grow(&w->key, &w->key_room, n, sizeof *w->key)) != REMAP_OK) return -1;
+  for (int k = 0; k < n; k++)
+    w->key[k] = (rm_keyed){locus_key(&w->side[list[k]].from) + locus_key(&w->side[list[k]].to), list[k]};
+  if ((w->status = sort_keys(w, n)) != REMAP_OK) return -1;
+  for (int first = 0, end; first < n; first = end) {
+    const polygon_side *one     = &w->side[w->key[first].item];
+    int                 balance = 0;
+    bool                alike   = true;
+
+    for (end = first; end < n && w->key[end].key == w->key[first].key; end++) {
+      const polygon_side *s     = &w->side[w->key[end].item];
+      const int           order = compare_sides(one, s);
+      alike &= order != 0;
+      balance += order * s->times;
+    }
+    if (alike && balance == 0) continue;
+    for (int k = first; k < end; k++) list[left++] = (int)w->key[k].item;
+  }
+  return left;
+}
+
+/* ---- polygons by their planes -------------------------------------------------------------------------------------------- */
+
+static const double *corner_of(const work *w, const polygon *g)
+{
+  const rm_trimesh *m = w->o->mesh[g->mesh];
+  return m->vertex[m->triangle[g->triangle][0]];
+}
+
+/* A polygon may have area: its triangle has, and its sides do not run to and fro between two vertices. */
+static bool may_have_area(work *w, polygon *g)
 {
   const double *one = NULL, *other = NULL;
-  const int     k = longest_axis(w, g), scale = RM_INT_SCALE;
-  bool          simple = true;
-  rm_int        first[3], at[3], line[3], d;
-  bool          has_first = false, has_line = false;
 
-  for (int c = g->first_corner; c >= 0 && simple; c = w->corner[c].next) { /* mostly the same vertex or two, again and again */
-    const double *v = limit_vertex(w, &w->corner[c]);
-    if (!one) one = v;
-    else if (v && !other && !is_same(v, one)) other = v;
-    simple = v && (is_same(v, one) || (other && is_same(v, other)));
-  }
-  if (simple) return true;
-  for (int c = g->first_corner; c >= 0; c = w->corner[c].next) {
-    homogeneous(w->o, &w->corner[c], limit_vertex(w, &w->corner[c]), k, scale, has_first ? at : first);
-    if (!has_first) {
-      has_first = true;
-    } else if (!has_line) {
-      rm_int_cross(line, first, at);
-      has_line = rm_int_sign(&line[0]) || rm_int_sign(&line[1]) || rm_int_sign(&line[2]);
-    } else {
-      rm_int_dot(&d, line, at);
-      if (rm_int_sign(&d)) return false;
+  rm_moments_settle(w, g);
+  for (int k = g->first_side; k >= 0; k = w->side[k].next)
+    for (int h = 0; h < 2; h++) {
+      const double *v = h ? w->side[k].to.vertex : w->side[k].from.vertex;
+      if (!v) return rm_moments_axis(w->o->mesh[g->mesh], g->triangle) >= 0;
+      if (!one || is_same(v, one))
+        one = v;
+      else if (!other || is_same(v, other))
+        other = v;
+      else
+        return rm_moments_axis(w->o->mesh[g->mesh], g->triangle) >= 0;
     }
-  }
-  return true;
+  return false;
 }
 
-/* Both ends of the side that begins with corner c, going round. */
-static void side_ends(const work *w, int c, int k, rm_int start[3], rm_int end[3])
+/* The polygons that may have area, plane by plane, into w->plane; their number, -1 if memory ran out. */
+static int sort_by_plane(work *w, const slot *s)
 {
-  const corner *to = &w->corner[c + 1];
-
-  homogeneous(w->o, &w->corner[c], limit_vertex(w, &w->corner[c]), k, RM_INT_SCALE, start);
-  homogeneous(w->o, to, limit_vertex(w, to), k, RM_INT_SCALE, end);
-}
-
-static bool is_same_place(const rm_int a[3], const rm_int b[3])
-{
-  rm_int x, y;
-
-  for (int h = 0; h < 2; h++) {
-    rm_int_mul(&x, &a[h], &b[2]);
-    rm_int_mul(&y, &b[h], &a[2]);
-    rm_int_sub(&x, &x, &y);
-    if (rm_int_sign(&x)) return false;
-  }
-  return true;
-}
-
-static bool is_on(const rm_int line[3], const rm_int at[3])
-{
-  rm_int d;
-
-  rm_int_dot(&d, line, at);
-  return rm_int_sign(&d) == 0;
-}
-
-/* The polygon's limit has no area: on every line, as many of the sides that lie there start as end at any place, for only then do
- * they run to and fro. O(sides squared), exact. */
-static bool is_without_area(const work *w, const polygon *g)
-{
-  const int k = longest_axis(w, g);
-  rm_int    from[3], to[3], line[3], start[3], end[3];
-
-  if (is_line(w, g)) return true;
-  for (int c = g->first_corner; c >= 0; c = w->corner[c].next) {
-    int balance[2] = {0, 0};
-
-    side_ends(w, c, k, from, to);
-    if (is_same_place(from, to)) continue;
-    rm_int_cross(line, from, to);
-    for (int d = g->first_corner; d >= 0; d = w->corner[d].next) {
-      side_ends(w, d, k, start, end);
-      if (!is_on(line, start) || !is_on(line, end)) continue;
-      balance[0] += is_same_place(start, from) - is_same_place(end, from);
-      balance[1] += is_same_place(start, to) - is_same_place(end, to);
-    }
-    if (balance[0] || balance[1]) return false;
-  }
-  return true;
-}
-
-/* ------------------------------------------------------------------------------------------------------------------------ */
-
-/* The polygons of a pair without volume cancel: each one whose limit has area meets an exactly coplanar one that faces the other
- * way. In untangled cells the reverse holds too. */
-bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s)
-{
-  const rm_lid cell[2] = {i, s->target};
+  int n = 0;
 
   for (int k = s->first_polygon; k >= 0; k = w->polygon[k].next) {
-    const polygon *g = &w->polygon[k];
-    bool           cancels = false;
-
-    if (!has_area(w, i, s, g) && is_without_area(w, g)) continue;
-    for (int l = s->first_polygon; l >= 0 && !cancels; l = w->polygon[l].next) {
-      const polygon *h = &w->polygon[l];
-      cancels = l != k && facing(w, cell, g->mesh, g->triangle, h->mesh, h->triangle) < 0 &&
-                coplanar(w, g->mesh, g->triangle, h->mesh, h->triangle);
-    }
-    if (!cancels) return true;
+    if (!may_have_area(w, &w->polygon[k])) continue;
+    if ((w->status = rm_grow(&w->plane, &w->plane_room, n + 1, sizeof *w->plane)) != REMAP_OK) return -1;
+    w->plane[n++] = k;
   }
-  return false;
+  if (n < 4) return n;
+  if ((w->status = rm_grow(&w->key, &w->key_room, n, sizeof *w->key)) != REMAP_OK) return -1;
+  for (int k = 0; k < n; k++) {
+    const polygon *g   = &w->polygon[w->plane[k]];
+    uint64_t       key = 0;
+
+    if (n > FEW) {
+      const rm_trimesh *m     = w->o->mesh[g->mesh];
+      const rm_lid     *t     = m->triangle[g->triangle];
+      const rm_modulus *first = rm_moments_modulus(w, 0);
+      if (!first) return -1;
+      key = rm_residue_of_plane(first, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]);
+    } else {
+      while (!rm_moments_coplanar(w, g->mesh, g->triangle, w->polygon[w->plane[key]].mesh, w->polygon[w->plane[key]].triangle))
+        key++;
+    }
+    w->key[k] = (rm_keyed){key, w->plane[k]};
+  }
+  if ((w->status = sort_keys(w, n)) != REMAP_OK) return -1;
+  for (int k = 0; k < n; k++) w->plane[k] = (int)w->key[k].item;
+  return n;
 }
 
-/* Area shared by triangles a and b projected along axis k, by clipping one at the sides of the other; computed relative to o. */
-static double shared_area(const double *const a[3], const double *const b[3], int k, const double o[3])
+/* Add what is left of the sides of polygons first .. end - 1 of w->plane, which lie in one plane, to the num in w->left,
+ * unless they have no net area; the new number, -1 if memory ran out. */
+static int add_plane(work *w, int first, int end, int num)
 {
-  const int x = (k + 1) % 3, y = (k + 2) % 3;
-  double    loop[2][8][2], area = 0;
-  int       n = 3, from = 0;
-  double    c[3][2];
+  const polygon *one    = &w->polygon[w->plane[first]];
+  const double  *corner = corner_of(w, one);
+  int            n      = 0;
 
-  for (int h = 0; h < 3; h++) {
-    loop[0][h][0] = a[h][x] - o[x], loop[0][h][1] = a[h][y] - o[y];
-    c[h][0] = b[h][x] - o[x], c[h][1] = b[h][y] - o[y];
-  }
-  const double turn = (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]) < 0 ? -1 : 1;
-  for (int h = 0; h < 3; h++, from = 1 - from) {
-    const double *p = c[h], u[2] = {c[(h + 1) % 3][0] - p[0], c[(h + 1) % 3][1] - p[1]};
-    double      (*in)[2] = loop[from], (*out)[2] = loop[1 - from];
-    int           m = 0;
-    for (int i = 0; i < n; i++) {
-      const double *q = in[i], *r = in[(i + 1) % n];
-      const double  s = turn * (u[0] * (q[1] - p[1]) - u[1] * (q[0] - p[0])), t = turn * (u[0] * (r[1] - p[1]) - u[1] * (r[0] - p[0]));
-      if (s >= 0) out[m][0] = q[0], out[m][1] = q[1], m++;
-      if ((s > 0 && t < 0) || (s < 0 && t > 0)) {
-        const double l = s / (s - t);
-        out[m][0] = q[0] + l * (r[0] - q[0]), out[m][1] = q[1] + l * (r[1] - q[1]), m++;
-      }
+  for (int k = first; k < end; k++)
+    for (int at = w->polygon[w->plane[k]].first_side; at >= 0; at = w->side[at].next) {
+      if ((w->status = rm_grow(&w->left, &w->left_room, num + n + 1, sizeof *w->left)) != REMAP_OK) return -1;
+      w->left[num + n++]   = at;
+      w->side[at].in_plane = corner;
     }
-    n = m;
-  }
-  for (int i = 1; i + 1 < n; i++)
-    area += (loop[from][i][0] - loop[from][0][0]) * (loop[from][i + 1][1] - loop[from][0][1]) -
-            (loop[from][i][1] - loop[from][0][1]) * (loop[from][i + 1][0] - loop[from][0][0]);
-  return fabs(area) / 2;
+  n = cancel(w, w->left + num, n);
+  if (n <= 0) return n < 0 ? n : num;
+  const exact_sum area = {
+      .side = w->left + num, .num_sides = n, .axis = rm_moments_axis(w->o->mesh[one->mesh], one->triangle), .origin = corner};
+  return rm_moments_is_zero(w, &area) ? num : num + n;
 }
 
-/* Simulation of simplicity puts triangle t of mesh `mesh` on the inner side of the coplanar triangle b of the other mesh's cell. */
-static bool is_just_inside(const work *w, const rm_lid cell[2], int mesh, rm_lid t, rm_lid b)
+/* The end of the run of polygons in w->plane that lie in one plane with polygon first. */
+static int run_of_plane(const work *w, int first, int n)
 {
-  const rm_trimesh *other = w->o->mesh[1 - mesh];
-  const rm_lid     *v     = other->triangle[b];
-  const int         side  = rm_point_side(other->vertex[v[0]], other->vertex[v[1]], other->vertex[v[2]],
-                                          w->o->mesh[mesh]->vertex[w->o->mesh[mesh]->triangle[t][0]], mesh ? -1 : 1, NULL);
-  return other->side[b][0] == cell[1 - mesh] ? side < 0 : side > 0;
+  const polygon *one = &w->polygon[w->plane[first]];
+  int            end = first + 1;
+
+  while (end < n &&
+         rm_moments_coplanar(w, one->mesh, one->triangle, w->polygon[w->plane[end]].mesh, w->polygon[w->plane[end]].triangle))
+    end++;
+  return end;
 }
 
-/* The skin of a mesh passes through the pair's cell of the other mesh: one of its polygons there has area beyond what lies in
- * coplanar triangles of that cell with the same side outward. (Coincident skins, as of two meshes of one domain, do not make a cell
- * partial. Where they are put just outside the cell they are no polygons of it; where just inside, their area is taken off.) */
-bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bool is_flat)
+bool rm_moments_has_volume(work *w, const slot *s)
 {
-  const rm_lid      cell[2] = {i, s->target};
-  const rm_trimesh *own = w->o->mesh[mesh], *other = w->o->mesh[1 - mesh];
+  const int n          = sort_by_plane(w, s);
+  int       num_planes = 0, num = 0;
 
-  for (int l = s->first_polygon; l >= 0; l = w->polygon[l].next) {
-    const polygon *g = &w->polygon[l];
-    const rm_lid   t = g->triangle;
+  for (int first = 0; n > 3 && first < n && num_planes < 4; first = run_of_plane(w, first, n)) num_planes++;
+  if (num_planes < 4) return false;
+  num_planes = 0;
+  for (int first = 0, end; first < n; first = end) {
+    const int before = num;
 
-    if (g->mesh != mesh || !own->triangle_is_skin[t] || (!has_area(w, i, s, g) && is_without_area(w, g))) continue;
-    const double *n = own->normal[t], square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    const double *v[3] = {own->vertex[own->triangle[t][0]], own->vertex[own->triangle[t][1]], own->vertex[own->triangle[t][2]]};
-    int           k    = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
-    if (fabs(n[2]) > fabs(n[k])) k = 2;
-    const double area = fabs(g->area) / 2 * fabs(n[k]) / square;
-    double       shared = 0;
-    for (rm_lid a = other->cell_triangle_offset[cell[1 - mesh]]; a < other->cell_triangle_offset[cell[1 - mesh] + 1]; a++) {
-      const rm_lid b = other->cell_triangle[a] / 2;
-      if (!coplanar(w, mesh, t, 1 - mesh, b)) continue;
-      if (!is_flat && (facing(w, cell, mesh, t, 1 - mesh, b) < 0 || !is_just_inside(w, cell, mesh, t, b))) continue;
-      const double *c[3] = {other->vertex[other->triangle[b][0]], other->vertex[other->triangle[b][1]], other->vertex[other->triangle[b][2]]};
-      shared += shared_area(v, c, k, s->o);
-    }
-    if (shared == 0 || fabs(area - shared) > 0x1p-40 * area) return true;
+    end = run_of_plane(w, first, n);
+    num = add_plane(w, first, end, num);
+    if (num < 0 || w->status != REMAP_OK) return true;
+    num_planes += num > before;
   }
-  return false;
+  if (num_planes < 4) return false;
+  return !rm_moments_is_zero(
+      w, &(exact_sum){.side = w->left, .num_sides = num, .axis = -1, .origin = w->side[w->left[0]].in_plane});
+}
+
+void rm_moments_decided(work *w)
+{
+  free(w->polygon);
+  free(w->bucket);
+  free(w->side);
+  free(w->plane);
+  free(w->left);
+  free(w->key);
+  free(w->spare);
+  free(w->strip);
+  free(w->modulus);
 }

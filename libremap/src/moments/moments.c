@@ -429,7 +429,7 @@ static remap_status collect_polygons(work *w, rm_lid i)
   return w->status;
 }
 
-static uint8_t skins_in(const work *w, rm_lid i, const slot *s, bool is_flat)
+static uint8_t skins_in(work *w, rm_lid i, const slot *s, bool is_flat)
 {
   uint8_t flags = 0;
 
@@ -466,10 +466,11 @@ static remap_status finish_cell(work *w, rm_lid i)
     slot *s = &w->slots[k];
 
     w->slot_of[s->target] = -1;
-    if (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, i, s))
+    if (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, s))
       RM_TRY(drop_pair(w, i, s));
     else
       RM_TRY(push_pair(w, i, s, skins_in(w, i, s, false)));
+    RM_TRY(w->status);
   }
   w->num_slots = 0;
   return REMAP_OK;
@@ -574,10 +575,8 @@ remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_ove
 
   if (status == REMAP_OK) status = all_cells(&w);
   if (status == REMAP_OK) status = keep(arena, &w, out);
+  rm_moments_decided(&w);
   free(w.slots);
-  free(w.polygon);
-  free(w.corner);
-  free(w.bucket);
   free(w.exact);
   free(w.source);
   free(w.target);

@@ -3,6 +3,7 @@
 #define RM_MOMENTS_PRIVATE_H
 
 #include "geom/expansion.h"
+#include "geom/residue.h"
 #include "moments/moments.h"
 
 #if defined(__GNUC__)
@@ -57,6 +58,21 @@ typedef struct plane {
   double        height;  /* foot = height n */
 } plane;
 
+/* Where simulation of simplicity leaves a point: in a vertex of one of the meshes, or where a crossing is. */
+typedef struct locus {
+  const double *vertex;   /* its coordinates if it is one, else NULL */
+  int           mesh;     /* of the edge                             */
+  int64_t       crossing; /* its place in the trace, -1 for a vertex */
+} locus;
+
+/* A side of a polygon, going round it. */
+typedef struct polygon_side {
+  int           next;  /* of the same polygon, -1 */
+  int           times; /* it counts so often      */
+  locus         from, to;
+  const double *in_plane; /* a point of the polygon's plane */
+} polygon_side;
+
 /* One polygon of a pair, for the decision whether the pair has volume. */
 typedef struct polygon {
   int     next; /* of the same pair, -1 */
@@ -65,20 +81,29 @@ typedef struct polygon {
   int     mesh;
   rm_lid  triangle;
   int32_t num_cones;
-  int     first_corner; /* in work.corner, -1 */
+  int     first_side; /* in work.side, -1 */
+  bool    is_settled; /* its sides are those in the limit, where they come to something */
   double  area; /* twice, times the normal's magnitude, outward or not as the cones' signs say */
   double  first[3]; /* one of its vertices, relative to the pair's origin */
   double  reach;    /* largest distance of the others from it, by any one coordinate */
 } polygon;
 
-/* A vertex of a polygon, for the decision whether it has area: the start of a side, followed by the side's end. */
-typedef struct corner {
-  int           next;     /* start of another side of the same polygon, -1 */
-  int           mesh;     /* as in point             */
-  rm_lid        edge, triangle;
-  int64_t       crossing;
-  const double *vertex;   /* its coordinates if it is a vertex, else NULL */
-} corner;
+/* A side of what two coplanar triangles have in common: along an edge p -> q of one of them, from where it meets the line
+ * through from[0] and from[1], which are NULL if that is p, to where it meets the line through to[0] and to[1], NULL for q. */
+typedef struct strip {
+  const double *p, *q, *from[2], *to[2];
+} strip;
+
+/* Sums that may be exactly zero (rational.c). */
+typedef struct exact_sum {
+  const int   *side; /* [num_sides] in work.side */
+  int64_t      num_sides;
+  const strip *strip; /* [num_strips] counted strip_sign times; an area's only */
+  int64_t      num_strips;
+  int          strip_sign;
+  int          axis;   /* twice the area that the sides bound, seen along this axis; -1: six times the volume */
+  const double *origin; /* of the cones */
+} exact_sum;
 
 /* A crossing in double-double, relative to its edge's first vertex. */
 typedef struct memo {
@@ -108,9 +133,16 @@ typedef struct work {
   int              *bucket; /* [num_buckets] first polygon of each hash value, -1 */
   int64_t           bucket_room;
   int               num_buckets;
-  corner           *corner;
-  int64_t           corner_room;
-  int               num_corners;
+  polygon_side     *side;
+  int64_t           side_room;
+  int               num_sides;
+  int              *plane, *left; /* polygons by plane; sides that are left of them */
+  rm_keyed         *key, *spare;
+  strip            *strip;
+  rm_modulus       *modulus; /* [num_moduli] descending primes */
+  int64_t           plane_room, left_room, key_room, spare_room, strip_room, modulus_room, num_moduli;
+  double          (*triangle_box[2])[6]; /* [side][triangles] of the meshes that have a tree     */
+  const rm_boxtree *tree[2];             /* [side] over a mesh's triangles, NULL: not yet needed */
   rm_dd           (*exact)[10]; /* [num_slots] sums of those marked AGAIN */
   int64_t           exact_room;
   memo             *memo; /* [NUM_MEMOS] */
@@ -124,8 +156,8 @@ typedef struct work {
   int64_t           num_pairs, room[7];
 } work;
 
-/* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2 (or in
- * one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. */
+/* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2
+ * (or in one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. */
 typedef void sink(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q);
 
 /* A point relative to an origin. */
@@ -143,11 +175,35 @@ sink rm_moments_add_polygon;
 /* Forward error of 6 V as it was summed in doubles. */
 double rm_moments_noise(const work *w, rm_lid i, const slot *s);
 
-/* True if the exact volume of the pair, whose sum is within its noise, is not zero (DESIGN 2.6). Needs its polygons. */
-bool rm_moments_has_volume(const work *w, rm_lid i, const slot *s);
+/* The polygon has area beyond rounding: its points err by 4 extents, in units of u, however small it is itself. */
+bool rm_moments_has_area(const work *w, rm_lid i, const slot *s, const polygon *g);
 
-/* True if the skin of a mesh passes through the pair's cell of the other mesh. is_flat: the pair has no volume, and a skin that lies in the
- * other cell's face, to whichever side, does not pass through it. Needs its polygons. */
-bool rm_moments_skin_passes(const work *w, rm_lid i, const slot *s, int mesh, bool is_flat);
+/* Triangles of the meshes lie in one plane exactly; a triangle without area lies in every plane. */
+bool rm_moments_coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b);
+
+/* Exact sign of the component of a triangle's normal along an axis; an axis along which it is not 0, mostly the longest, or
+ * -1. */
+int rm_moments_normal_sign(const rm_trimesh *m, rm_lid t, int axis);
+int rm_moments_axis(const rm_trimesh *m, rm_lid t);
+
+/* Put a polygon's sides where they are in the limit, and leave out those that come to nothing there. */
+void rm_moments_settle(work *w, polygon *g);
+
+/* True if the exact volume of the pair, whose sum is within its noise, is not zero (DESIGN 2.6). Needs its polygons.
+ * w->status tells if memory ran out, as below. */
+bool rm_moments_has_volume(work *w, const slot *s);
+
+/* True if the skin of a mesh passes through the pair's cell of the other mesh. is_flat: the pair has no volume, and a skin
+ * that lies in the other cell's face, to whichever side, does not pass through it. Needs its polygons. */
+bool rm_moments_skin_passes(work *w, rm_lid i, const slot *s, int mesh, bool is_flat);
+
+/* Prime number k, found when first needed; NULL if memory ran out. */
+const rm_modulus *rm_moments_modulus(work *w, int64_t k);
+
+/* True if the sum is zero exactly. O(terms), hardly ever more, if it is not; that times its length in words if it is. */
+bool rm_moments_is_zero(work *w, const exact_sum *sum);
+
+/* Give back what decisions needed. */
+void rm_moments_decided(work *w);
 
 #endif

@@ -55,6 +55,9 @@ typedef struct rm_trimesh {
   const rm_lid  *skin;                  /* [num_skin] triangles with one side only, ascending                    */
   const double (*skin_box)[6];          /* [num_skin]                                                            */
   const rm_boxtree *skin_tree;          /* over skin_box                                                         */
+  rm_lid         num_odd;               /* cells that are not star-shaped, or of many triangles among others     */
+  const double (*odd_box)[6];           /* [num_odd] outside of the skin, too, edges meet them by the box tree    */
+  const rm_boxtree *odd_tree;           /* over odd_box; NULL if there are none                                  */
 } rm_trimesh;
 
 /* The face of the piece that a triangle is part of, the lower one if it is of two. */

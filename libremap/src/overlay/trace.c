@@ -514,13 +514,26 @@ static double parameter(const tracer *t, rm_lid b)
   return rm_crossing_parameter(t->p0, t->p1, t->other->vertex[v[0]], t->other->vertex[v[1]], t->other->vertex[v[2]]);
 }
 
+static int is_met(void *user, rm_lid item)
+{
+  (void)user, (void)item;
+  return 1;
+}
+
+/* The present edge comes near a cell that may be tangled: that may stick out of the skin, so what is outside may cross it. */
+static bool is_near_odd(const tracer *t)
+{
+  const rm_trimesh *m = t->other;
+  return m->num_odd > 0 && rm_boxtree_query_segment(m->odd_tree, m->odd_box, t->p0, t->p1, is_met, NULL);
+}
+
 /* The crossings of the line from p0 to p1, which need not be an edge, into t->hits. *state, that of p0, becomes that of p1. */
 static remap_status find_hits(tracer *t, const double *p0, const double *p1, rm_lid *state)
 {
   walked how = WALK_NOT;
 
   set_line(t, p0, p1);
-  if (!t->by_tree) RM_TRY(walk_alone(t, state, &how));
+  if (!t->by_tree && !is_near_odd(t)) RM_TRY(walk_alone(t, state, &how));
   if (how == WALKED) return REMAP_OK;
   if (how == WALK_TOGETHER) RM_TRY(walk_together(t, *state, &how));
   if (how != WALKED) RM_TRY(all_hits(t));

@@ -543,7 +543,6 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
   uint8_t *walk, *pinched;
   double (*odd_box)[6];
   rm_lid   num_odd = 0;
-  const rm_boxtree *odd_tree;
 
   RM_NEW0(walk, arena, m->num_cells);
   RM_NEW0(pinched, scratch, m->num_vertices);
@@ -563,9 +562,15 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
     }
   }
   if (num_odd) {
-    RM_TRY(rm_boxtree_build(scratch, num_odd, (const double (*)[6])odd_box, &odd_tree));
+    double (*kept)[6];
+
+    RM_NEW(kept, arena, num_odd);
+    memcpy(kept, odd_box, sizeof *kept * (size_t)num_odd);
+    m->num_odd = num_odd;
+    m->odd_box = (const double (*)[6])kept;
+    RM_TRY(rm_boxtree_build(arena, num_odd, m->odd_box, &m->odd_tree));
     for (rm_lid c = 0; c < m->num_cells; c++)
-      if (walk[c] != RM_WALK_NOT && rm_boxtree_meets(odd_tree, (const double (*)[6])odd_box, m->cell_box[c])) walk[c] = RM_WALK_NOT;
+      if (walk[c] != RM_WALK_NOT && rm_boxtree_meets(m->odd_tree, m->odd_box, m->cell_box[c])) walk[c] = RM_WALK_NOT;
   }
   m->cell_walk = walk;
   return REMAP_OK;
