@@ -2,9 +2,12 @@
  * hexahedra of DESIGN section 6: mesh 1 is N^3, rotated by 0.3 about z and x and scaled by SCALE, mesh 2 is NB^3. ANGLE 0 with
  * SCALE 1 and PHASE as of mesh 2, 0.1, gives identical meshes where N is NB. One JSON line.
  *
- *   bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]]
+ *   bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]]      room cells alone
+ *   bench_cells all N NB SCALE diagonal|centre [ANGLE [PHASE]]             remap_supermesh, from the meshes as lent, union
+ *   bench_cells all spheres LEVEL [OFFSET]                                 the same of two closed surfaces
  *   bench_cells spheres LEVEL OFFSET [REPEATS]    two closed surfaces of 20 4^LEVEL triangles each, one moved by OFFSET radii
  *   bench_cells cut LEVEL [REPEATS]               one such surface in a grid of 32 x 40 x 23 boxes */
+#include <mpi.h>
 #include <stdio.h>
 #include <sys/resource.h>
 #include <time.h>
@@ -136,8 +139,51 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
   tm_free(target);
 }
 
+/* remap_supermesh on all ranks; the meshes are dealt in slabs. */
+static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces)
+{
+  static const remap_supermesh_options all = {.keep = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET, .pass_through = 1};
+  tm_mesh             *whole[2] = {source, target}, *mine[2];
+  remap_context       *ctx;
+  remap_options        how;
+  remap_supermesh_view v;
+  int                  rank, size;
+
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank), MPI_Comm_size(MPI_COMM_WORLD, &size);
+  remap_options_default(&how);
+  how.faces = faces;
+  if (remap_create(MPI_COMM_WORLD, &how, &ctx) != REMAP_OK) exit(1);
+  for (int side = 0; side < 2; side++) {
+    int *deal  = tm_deal(whole[side], size, TM_SLABS, 1);
+    mine[side] = tm_part(whole[side], deal, rank, 0);
+    remap_set_mesh(ctx, side, &mine[side]->view);
+    tm_free(whole[side]), free(deal);
+  }
+  const double before = peak_bytes(), t0 = cpu_seconds();
+  if (remap_supermesh(ctx, &all, &v) != REMAP_OK) fprintf(stderr, "%s\n", remap_message(ctx)), exit(1);
+  const double t1 = cpu_seconds();
+  printf("{\"bench\":\"supermesh\",\"rank\":%d,\"ranks\":%d,\"maph\":%lld,\"maph_here\":%lld,\"faces\":%lld,\"nodes\":%lld,"
+         "\"us_per_maph\":%.2f,\"bytes_peak_per_maph\":%.0f,\"s_partition\":%.3f,\"s_triangulation\":%.3f,\"s_crossings\":%.3f,"
+         "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f}\n",
+         rank, size, (long long)v.global_cells, (long long)v.num_cells, (long long)v.num_faces, (long long)v.num_nodes,
+         1e6 * (t1 - t0) / (double)v.num_cells, (peak_bytes() - before) / (double)v.num_cells, v.seconds_partition,
+         v.seconds_triangulation, v.seconds_crossings, v.seconds_polygons, v.seconds_cells, v.seconds_faces, v.seconds_numbering, t1 - t0);
+  remap_destroy(&ctx);
+  for (int side = 0; side < 2; side++) tm_free(mine[side]);
+}
+
 int main(int argc, char **argv)
 {
+  if (argc > 3 && !strcmp(argv[1], "all")) {
+    const bool spheres = !strcmp(argv[2], "spheres");
+    MPI_Init(&argc, &argv);
+    if (spheres) run_all(sphere(atoi(argv[3]), 0), sphere(atoi(argv[3]), argc > 4 ? atof(argv[4]) : .1), REMAP_FACES_DIAGONAL);
+    else if (argc > 5)
+      run_all(tm_benchmark(atoi(argv[2]), argc > 7 ? atof(argv[7]) : 0.7, argc > 6 ? atof(argv[6]) : 0.3, atof(argv[4])),
+              tm_benchmark(atoi(argv[3]), 0.1, 0, 1), strcmp(argv[5], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE);
+    MPI_Finalize();
+    return 0;
+  }
   if (argc > 3 && !strcmp(argv[1], "spheres")) {
     run("spheres", sphere(atoi(argv[2]), 0), sphere(atoi(argv[2]), atof(argv[3])), REMAP_FACES_DIAGONAL, argc > 4 ? atoi(argv[4]) : 1);
   } else if (argc > 2 && !strcmp(argv[1], "cut")) {

@@ -124,6 +124,10 @@ static int touch_triangle(void *user, rm_lid t)
   double            o[3];
   int               turn[3], zeros = 0;
 
+  for (int c = 0; c < 3; c++) {
+    const double x = q->p[c];
+    if ((v[0][c] < x && v[1][c] < x && v[2][c] < x) || (v[0][c] > x && v[1][c] > x && v[2][c] > x)) return 0;
+  }
   if (rm_orient3d(v[0], v[1], v[2], q->p) != 0 || !rm_is_present(q->l, q->other, t)) return 0;
   if (!rm_off_plane(v[0], v[1], v[2], o)) return 0;
   for (int h = 0; h < 3; h++) {
@@ -190,9 +194,33 @@ typedef struct edge_query {
   builder      *b;
   rm_lid        edge;
   const double *p0, *p1;
-  int64_t       first; /* contact of this edge */
+  double        box[6]; /* of the present piece of it */
+  int64_t       first;  /* contact of this edge       */
   remap_status  status;
 } edge_query;
+
+/* Sides of the piece's box that a point is beyond; points beyond one and the same make no edge that meets the piece. */
+static unsigned beyond(const edge_query *q, const double p[3])
+{
+  unsigned code = 0;
+
+  for (int c = 0; c < 3; c++) code |= (unsigned)(p[c] < q->box[c]) << c | (unsigned)(p[c] > q->box[c + 3]) << (c + 3);
+  return code;
+}
+
+/* The box of the piece between two parameters, with room for their rounding. */
+static void set_box(edge_query *q, double from, double to)
+{
+  double size = 0;
+
+  for (int c = 0; c < 3; c++) size = fmax(size, fabs(q->p1[c] - q->p0[c]));
+  for (int c = 0; c < 3; c++) {
+    const double u = q->p1[c] - q->p0[c], a = q->p0[c] + from * u, b = q->p0[c] + to * u;
+    const double slack = 0x1p-46 * size + 0x1p-50 * fmax(fabs(q->p0[c]), fabs(q->p1[c]));
+    q->box[c]          = fmin(a, b) - slack;
+    q->box[c + 3]      = fmax(a, b) + slack;
+  }
+}
 
 /* Edges that are coplanar and cross inside both: each has its ends on both sides of the other. */
 static int touch_edge(edge_query *q, rm_lid f)
@@ -228,24 +256,36 @@ static int touch_edges_of_skin(void *user, rm_lid item)
   return touch_edges_of(user, q->b->l->o->mesh[1]->skin[item]);
 }
 
-/* Contacts of an edge with those of cell j, in which a piece of it runs. */
+/* Contacts of the present piece with the edges of cell j, by sides of its box that all their vertices are beyond. */
+static void touch_near(edge_query *q, rm_lid j)
+{
+  static const int  low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
+  const rm_trimesh *m2     = q->b->l->o->mesh[1];
+  const rm_lid     *vertex = m2->cell_vertex + m2->cell_vertex_offset[j], n = m2->cell_vertex_offset[j + 1] - m2->cell_vertex_offset[j];
+  unsigned          code[256]; /* places in a cell are bytes */
+
+  for (rm_lid k = 0; k < n; k++) code[k] = beyond(q, m2->vertex[vertex[k]]);
+  for (rm_lid k = m2->cell_triangle_offset[j]; k < m2->cell_triangle_offset[j + 1]; k++) {
+    const uint8_t *corner = m2->cell_triangle_vertex[k];
+    if (code[corner[0]] & code[corner[1]] & code[corner[2]]) continue;
+    for (int h = 0; h < 3; h++)
+      if (!(code[corner[low[h]]] & code[corner[high[h]]]) && touch_edge(q, m2->triangle_edge[m2->cell_triangle[k] / 2][h])) return;
+  }
+}
+
+/* The same for any cell in which the piece runs. */
 static remap_status touch_cell(edge_query *q, rm_lid j)
 {
   builder          *b  = q->b;
   const rm_trimesh *m2 = b->l->o->mesh[1];
-  double            at[6];
 
   if (j >= 0 && m2->cell_vertex_offset[j] < m2->cell_vertex_offset[j + 1]) {
-    for (rm_lid k = m2->cell_triangle_offset[j]; k < m2->cell_triangle_offset[j + 1]; k++)
-      if (touch_edges_of(q, m2->cell_triangle[k] / 2)) break;
-    return q->status;
-  }
-  for (int c = 0; c < 3; c++) at[c] = fmin(q->p0[c], q->p1[c]), at[c + 3] = fmax(q->p0[c], q->p1[c]);
-  if (j == RM_OUTSIDE) {
-    rm_boxtree_query(m2->skin_tree, m2->skin_box, at, touch_edges_of_skin, q);
+    touch_near(q, j);
+  } else if (j == RM_OUTSIDE) {
+    rm_boxtree_query(m2->skin_tree, m2->skin_box, q->box, touch_edges_of_skin, q);
   } else {
     RM_TRY(need_tree(b, 1));
-    rm_boxtree_query(b->tree[1], (const double (*)[6])b->box[1], at, touch_edges_of, q);
+    rm_boxtree_query(b->tree[1], (const double (*)[6])b->box[1], q->box, touch_edges_of, q);
   }
   return q->status;
 }
@@ -256,11 +296,13 @@ static remap_status cross_edges(builder *b)
   const rm_trace   *trace = &b->l->o->trace[0];
 
   for (rm_lid e = 0; e < m1->num_edges; e++) {
-    edge_query q = {b, e, m1->vertex[m1->edge[e][0]], m1->vertex[m1->edge[e][1]], b->num_contacts, REMAP_OK};
+    const rm_crossing *x = trace->crossing + trace->first[e];
+    edge_query         q = {b, e, m1->vertex[m1->edge[e][0]], m1->vertex[m1->edge[e][1]], {0}, b->num_contacts, REMAP_OK};
 
-    if (!b->edge_present[0][e]) continue;
-    RM_TRY(touch_cell(&q, trace->state[e]));
-    for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) RM_TRY(touch_cell(&q, trace->crossing[x].state));
+    for (rm_lid k = 0; k <= trace->count[e] && b->edge_present[0][e]; k++) {
+      set_box(&q, k ? x[k - 1].lambda : 0, k < trace->count[e] ? x[k].lambda : 1);
+      RM_TRY(touch_cell(&q, k ? x[k - 1].state : trace->state[e]));
+    }
   }
   for (int side = 0; side < 2; side++) {
     const rm_trimesh *m = b->l->o->mesh[side];
