@@ -20,6 +20,8 @@
  *   - cells are numbered zone after zone, in the order of the file, from 0; each rank owns one contiguous range of them, in
  *     the order of the ranks, the ranges being of equal length to within one. Only volume cells count: surface sections and
  *     two-dimensional zones are left out;
+ *   - a file opened for RCGNS_VERTICES hands out its median-dual mesh: cell k of a zone is then the one about its vertex k, and
+ *     CellCenter reads Vertex below;
  *   - zones are called "Base/Zone";
  *   - ADF and HDF5 files of any version are read; output is HDF5;
  *   - no function prints or exits; input files are never opened for writing.
@@ -63,11 +65,18 @@ typedef struct rcgns_message {
 /** An opened file. Opaque. */
 typedef struct rcgns_file rcgns_file;
 
+/** Where values are located. */
+typedef enum rcgns_location {
+  RCGNS_CELLS    = 0, /**< CellCenter: the file's own cells */
+  RCGNS_VERTICES = 1  /**< Vertex: "cells" are the median-dual cells about the vertices, one for each, everywhere below */
+} rcgns_location;
+
 /** How a file is opened. Start from rcgns_options_default(). The same on all ranks. */
 typedef struct rcgns_options {
-  const char *base;            /**< read this CGNSBase_t only; NULL (default): every base that holds volume cells */
-  double      scale;           /**< coordinates are multiplied by it first; default 1 */
-  double      transform[3][4]; /**< then x' = A x + b, rows [A | b]; default: identity. A must not be singular */
+  const char    *base;            /**< read this CGNSBase_t only; NULL (default): every base that holds volume cells */
+  double         scale;           /**< coordinates are multiplied by it first; default 1 */
+  rcgns_location location;        /**< default RCGNS_CELLS */
+  double         transform[3][4]; /**< then x' = A x + b, rows [A | b]; default: identity. A must not be singular */
 } rcgns_options;
 
 /** One zone with volume cells. */
@@ -84,6 +93,7 @@ typedef struct rcgns_info {
   const char            *path;      /**< as given */
   const char            *format;    /**< "HDF5" or "ADF" */
   double                 version;   /**< CGNSLibraryVersion, 0 if the file has none */
+  rcgns_location         location;  /**< as asked for */
   int64_t                num_cells; /**< volume cells that are read, all zones and ranks */
   int64_t                num_bases; /**< bases that are read */
   const char *const     *base;      /**< [num_bases] their names */
@@ -153,8 +163,8 @@ remap_nature rcgns_nature(const char *name, int is_integer, int *known);
 /** Read the tree of the file and this rank's part of the mesh. Collective on comm, which is duplicated. options NULL: the
  *  defaults. The caller owns *out and ends it with rcgns_close; it is NULL after a failure.
  *  Errors: USAGE (no such base), IO (missing, truncated, not CGNS, no volume cells, no coordinates, a size that does not
- *  match), GEOMETRY (NaN or infinite coordinates, a node number out of range, a face with more than two cells, a polyhedron
- *  with too few faces), MEMORY. That every cell is closed is remap_build's to check. */
+ *  match, vertices of higher-order elements), GEOMETRY (NaN or infinite coordinates, a node number out of range, a face with
+ *  more than two cells, a polyhedron with too few faces), MEMORY. That every cell is closed is remap_build's to check. */
 rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *options, rcgns_file **out,
                         rcgns_message *message);
 

@@ -8,6 +8,7 @@
  *   file.c       rcgns_open, rcgns_close, reading of slabs from either kind of file
  *   sids_zone.c  zones and element sections: what is a volume cell, and where its row lies
  *   sids_mesh.c  this rank's part of the mesh
+ *   sids_dual.c  the cells about its vertices instead
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
  *   sids_fields.c  FlowSolution_t: choice, names, values
  *   sids_write.c   the plan of an output file, rcgns_write
@@ -225,7 +226,7 @@ typedef struct rc_zone {
   const char *name;       /* "Base/Zone", in the file's names */
   bool        is_structured;
   int64_t     vertices[3], cells[3]; /* along i, j, k; unstructured: the first only */
-  int64_t     num_nodes, num_cells, first_cell;
+  int64_t     num_nodes, num_cells, first_node, first_cell;
   int64_t     coordinate[3];           /* nodes */
   int64_t     rind[6];                 /* of the coordinates: i before, i after, ... */
   int64_t     num_sections, num_faces; /* faces: rows of all of face */
@@ -238,7 +239,8 @@ typedef struct rc_zone {
 
 /* This rank's mesh while it grows. */
 typedef struct rc_mesh {
-  rc_array xyz;                                                             /* double[3] */
+  rc_array xyz;         /* double[3] */
+  rc_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
   rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
 } rc_mesh;
 
@@ -249,6 +251,7 @@ struct rcgns_file {
   rc_tree          tree;
   int64_t         *handle; /* [sources], -1: not open */
   double           version;
+  const char      *location;  /* "CellCenter" or "Vertex": what cells stand for */
   double           map[3][4]; /* coordinates: scale and transform in one */
   int64_t          num_zones;
   rc_zone         *zone;
@@ -304,6 +307,15 @@ bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, in
 /* Faces of the cells [lo, hi) (numbers in the zone) of polyhedra; first_cell is the local number of cell lo. Collective. */
 rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
                            int64_t first_cell, rcgns_message *message);
+/* Remember which node of its zone the next one of this rank's mesh is, if dual cells will be made. false: no memory. */
+bool rc_number_node(rcgns_file *file, const rc_zone *zone, int64_t node);
+/* Put the median-dual mesh in the place of this rank's: its cells are the vertices. Collective. */
+rcgns_status rc_dual_build(rcgns_file *file, rcgns_message *message);
+void         rc_mesh_drop(rc_mesh *mesh);
+/* What rcgns_mesh hands out, from what was built. */
+void rc_mesh_view(rcgns_file *file);
+/* Are values of the nodes located at cells, for this file? */
+static inline bool rc_is_dual(const rcgns_file *file) { return file->location[0] == 'V'; }
 /* Six times the volume of the cone from origin to the loop, fanned about its mean. */
 double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin);
 

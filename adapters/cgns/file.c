@@ -227,6 +227,7 @@ static rcgns_status fill_info(rcgns_file *file, rcgns_message *message)
 
 static rcgns_status open_file(rcgns_file *file, const rcgns_options *options, rcgns_message *message)
 {
+  file->location = options->location == RCGNS_VERTICES ? "Vertex" : "CellCenter";
   RC_TRY(rc_agree(file->comm, set_map(file, options, message), message));
   RC_TRY(rc_agree(file->comm, file->rank == 0 ? read_tree(file, message) : RCGNS_OK, message));
   RC_TRY(rc_tree_bcast(file->comm, &file->tree, message));
@@ -236,7 +237,11 @@ static rcgns_status open_file(rcgns_file *file, const rcgns_options *options, rc
   file->cell_lo = rc_share(file->num_cells, file->rank, file->size);
   file->cell_hi = rc_share(file->num_cells, file->rank + 1, file->size);
   RC_TRY(rc_agree(file->comm, fill_info(file, message), message));
-  return rc_mesh_build(file, message);
+  file->info.location = options->location;
+  RC_TRY(rc_mesh_build(file, message));
+  if (rc_is_dual(file)) RC_TRY(rc_dual_build(file, message));
+  rc_mesh_view(file);
+  return RCGNS_OK;
 }
 
 rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *options, rcgns_file **out, rcgns_message *message)
@@ -283,12 +288,7 @@ void rcgns_close(rcgns_file **address)
   free(file->handle);
   rc_zones_drop(file);
   rc_tree_drop(&file->tree);
-  rc_drop(&file->build.xyz);
-  rc_drop(&file->build.face_offset);
-  rc_drop(&file->build.face_node);
-  rc_drop(&file->build.face_owner);
-  rc_drop(&file->build.face_neighbour);
-  rc_drop(&file->build.cell_global);
+  rc_mesh_drop(&file->build);
   for (int64_t i = 0; i < file->names.count; i++) free(((char **)file->names.item)[i]);
   rc_drop(&file->names);
   rc_drop(&file->bases);

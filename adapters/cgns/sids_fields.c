@@ -89,18 +89,21 @@ static void location_of(const rc_tree *tree, int64_t solution, char *out, size_t
   if (!*out) snprintf(out, size, "Vertex");
 }
 
-static bool is_cell_centred(const rc_tree *tree, int64_t solution)
+/* Is it located where the file's values are? */
+static bool is_located(const rcgns_file *file, int64_t solution)
 {
   char location[RC_NAME];
 
-  location_of(tree, solution, location, sizeof location);
-  return !strcmp(location, "CellCenter");
+  location_of(&file->tree, solution, location, sizeof location);
+  return !strcmp(location, file->location);
 }
 
-/* CellCenter, of the whole zone, with at least one array. */
-static bool is_usable(const rc_tree *tree, int64_t solution)
+/* At the right place, of the whole zone, with at least one array. */
+static bool is_usable(const rcgns_file *file, int64_t solution)
 {
-  return is_cell_centred(tree, solution) && next_field(tree, solution, -1) >= 0 &&
+  const rc_tree *tree = &file->tree;
+
+  return is_located(file, solution) && next_field(tree, solution, -1) >= 0 &&
          rc_tree_find(tree, solution, -1, NULL, "PointList") < 0 && rc_tree_find(tree, solution, -1, NULL, "PointRange") < 0;
 }
 
@@ -149,16 +152,18 @@ static rcgns_status check_usable(const rcgns_file *file, const rc_zone *zone, in
 {
   const rc_tree *tree   = &file->tree;
   const char    *name   = rc_node_at(tree, solution)->name;
+  const char    *advice = "such fields cannot be remapped";
   words          fields = {.used = 0};
   char           location[RC_NAME];
 
-  if (is_usable(tree, solution)) return RCGNS_OK;
+  if (is_usable(file, solution)) return RCGNS_OK;
   location_of(tree, solution, location, sizeof location);
   list_fields(tree, solution, &fields);
-  if (!is_cell_centred(tree, solution))
-    return rc_fail(message, RCGNS_IO,
-                   "%s: zone %s: solution %s is %s-located (fields: %s): only CellCenter fields can be remapped", file->path,
-                   zone->name, name, location, fields.text);
+  if (!strcmp(location, "Vertex")) advice = "ask for vertices (--location vertex)";
+  if (!strcmp(location, "CellCenter")) advice = "ask for cells (--location cell)";
+  if (!is_located(file, solution))
+    return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s is %s-located (fields: %s), not %s: %s", file->path, zone->name,
+                   name, location, fields.text, file->location, advice);
   if (next_field(tree, solution, -1) < 0)
     return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s holds no fields", file->path, zone->name, name);
   return rc_fail(message, RCGNS_IO, "%s: zone %s: solution %s covers a part of the zone only (PointList or PointRange)",
@@ -175,7 +180,7 @@ static rcgns_status choose_by_name(rcgns_file *file, const char *name, bool opti
     words          have = {.used = 0};
 
     if (optional) {
-      file->solution[z] = at >= 0 && is_usable(&file->tree, at) ? at : -1;
+      file->solution[z] = at >= 0 && is_usable(file, at) ? at : -1;
       continue;
     }
     if (at < 0) {
@@ -195,7 +200,7 @@ static int64_t nth_usable(const rcgns_file *file, const rc_zone *zone, int64_t k
   int64_t last = -1, n = 0;
 
   for (int64_t at = -1; (at = rc_tree_find(&file->tree, zone->node, at, "FlowSolution_t", NULL)) >= 0;) {
-    if (!is_usable(&file->tree, at)) continue;
+    if (!is_usable(file, at)) continue;
     last = at;
     if (++n == k) return at;
   }
@@ -247,14 +252,13 @@ static rcgns_status choose_by_step(rcgns_file *file, int64_t step, rcgns_message
     }
     if (file->solution[z] < 0) {
       list_solutions(file, zone, &have);
-      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no CellCenter solution for step %s; it has: %s", file->path,
-                     zone->name, which, have.text);
+      return rc_fail(message, RCGNS_USAGE, "%s: zone %s: it has no %s solution for step %s; it has: %s", file->path, zone->name,
+                     file->location, which, have.text);
     }
     RC_TRY(check_usable(file, zone, file->solution[z], message));
   }
-  return by_order
-             ? rc_note(file, message, "no FlowSolutionPointers: steps are the CellCenter solutions in the order of the file")
-             : RCGNS_OK;
+  return by_order ? rc_note(file, message, "no FlowSolutionPointers: steps are the usable solutions in the order of the file")
+                  : RCGNS_OK;
 }
 
 /* Is there a usable node of that name in every zone? */
@@ -263,7 +267,7 @@ static bool is_everywhere(const rcgns_file *file, const char *name)
   for (int64_t z = 0; z < file->num_zones; z++) {
     const int64_t at = solution_named(file, file->zone + z, name);
 
-    if (at < 0 || !is_usable(&file->tree, at)) return false;
+    if (at < 0 || !is_usable(file, at)) return false;
   }
   return true;
 }
@@ -277,13 +281,13 @@ static rcgns_status explain_none(const rcgns_file *file, rcgns_message *message)
 
     if (nth_usable(file, zone, 1) >= 0) continue;
     for (int64_t at = -1; (at = rc_tree_find(&file->tree, zone->node, at, "FlowSolution_t", NULL)) >= 0;)
-      if (!is_cell_centred(&file->tree, at) && next_field(&file->tree, at, -1) >= 0)
-        return check_usable(file, zone, at, message);
+      if (!is_located(file, at) && next_field(&file->tree, at, -1) >= 0) return check_usable(file, zone, at, message);
     list_solutions(file, zone, &have);
-    return rc_fail(message, RCGNS_IO, "%s: zone %s: it holds no CellCenter solution with fields; it has: %s", file->path,
-                   zone->name, have.text);
+    return rc_fail(message, RCGNS_IO, "%s: zone %s: it holds no %s solution with fields; it has: %s", file->path, zone->name,
+                   file->location, have.text);
   }
-  return rc_fail(message, RCGNS_IO, "%s: no CellCenter solution has the same name in every zone: name one base", file->path);
+  return rc_fail(message, RCGNS_IO, "%s: no %s solution has the same name in every zone: name one base", file->path,
+                 file->location);
 }
 
 static rcgns_status choose_only(rcgns_file *file, bool optional, rcgns_message *message)
@@ -301,8 +305,8 @@ static rcgns_status choose_only(rcgns_file *file, bool optional, rcgns_message *
     add_word(&names, name);
   }
   if (num > 1)
-    return rc_fail(message, RCGNS_USAGE, "%s: it holds %lld CellCenter solutions: name one of %s", file->path, (long long)num,
-                   names.text);
+    return rc_fail(message, RCGNS_USAGE, "%s: it holds %lld %s solutions: name one of %s", file->path, (long long)num,
+                   file->location, names.text);
   if (num) return choose_by_name(file, only, false, message);
   return optional ? RCGNS_OK : explain_none(file, message);
 }
@@ -464,7 +468,7 @@ static int64_t cells_in(const rcgns_file *file, const rc_zone *zone, int64_t nod
   int64_t     at    = -1;
   rc_box      box;
 
-  if ((strcmp(label, "FlowSolution_t") && strcmp(label, "DiscreteData_t")) || !is_usable(&file->tree, node)) return -1;
+  if ((strcmp(label, "FlowSolution_t") && strcmp(label, "DiscreteData_t")) || !is_usable(file, node)) return -1;
   while ((at = next_field(&file->tree, node, at)) >= 0)
     if (!strcmp(rc_node_at(&file->tree, at)->name, field)) return core_of(file, zone, node, at, &box) ? at : -1;
   return -1;

@@ -36,6 +36,11 @@ bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, in
          rc_push(&mesh->face_neighbour, neighbour);
 }
 
+bool rc_number_node(rcgns_file *file, const rc_zone *zone, int64_t node)
+{
+  return !rc_is_dual(file) || rc_push(&file->build.node_number, zone->first_node + node);
+}
+
 double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin)
 {
   double mean[3] = {0, 0, 0}, sum = 0.0;
@@ -149,6 +154,14 @@ static rcgns_status patch_nodes(rcgns_file *file, const rc_zone *zone, const pat
   status = place_all(file, zone, p->count, x, x + p->count, x + 2 * p->count,
                      (p->k0 * zone->vertices[1] + p->j0) * zone->vertices[0], (double *)xyz->item + 3 * xyz->count, message);
   xyz->count += p->count;
+  for (int64_t i = 0; i < p->count && status == RCGNS_OK; i++) {
+    const int64_t row = i / zone->vertices[0], plane = row / p->rows;
+
+    if (!rc_number_node(file, zone,
+                        ((p->k0 + plane) * zone->vertices[1] + p->j0 + row % p->rows) * zone->vertices[0] +
+                            i % zone->vertices[0]))
+      status = rc_no_memory(message);
+  }
   status = rc_agree(file->comm, status, message);
 done:
   free(x);
@@ -382,6 +395,8 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, elements *e, r
   n         = e->node.key.count;
   e->shared = rc_alloc(n, 1);
   if (status == RCGNS_OK && !(e->shared && rc_reserve(xyz, n, 3 * sizeof(double)))) status = rc_no_memory(message);
+  for (int64_t i = 0; i < n && status == RCGNS_OK; i++)
+    if (!rc_number_node(file, zone, ((const int64_t *)e->node.key.item)[i])) status = rc_no_memory(message);
   RC_TRY(rc_nodes_fetch(file, status, zone, e->node.key.item, n, (double *)xyz->item + 3 * xyz->count, e->shared, message));
   xyz->count += n;
   return RCGNS_OK;
@@ -684,6 +699,13 @@ rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message)
     status                      = orient_zones(file, first_face, message);
   }
   free(first_face);
+  return status;
+}
+
+void rc_mesh_view(rcgns_file *file)
+{
+  const rc_mesh *build = &file->build;
+
   file->mesh = (remap_mesh){.num_nodes        = build->xyz.count,
                             .num_faces        = build->face_owner.count,
                             .num_cells        = build->cell_global.count,
@@ -697,5 +719,15 @@ rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message)
                             .num_zones        = file->num_zones,
                             .zone_name        = file->zone_name,
                             .zone_cell_offset = file->zone_cell_offset};
-  return status;
+}
+
+void rc_mesh_drop(rc_mesh *mesh)
+{
+  rc_drop(&mesh->xyz);
+  rc_drop(&mesh->node_number);
+  rc_drop(&mesh->face_offset);
+  rc_drop(&mesh->face_node);
+  rc_drop(&mesh->face_owner);
+  rc_drop(&mesh->face_neighbour);
+  rc_drop(&mesh->cell_global);
 }

@@ -145,8 +145,8 @@ static rcgns_status add_values(change *c, int64_t zone, int64_t field, int64_t p
 
 static rcgns_status add_location(change *c, int64_t parent)
 {
-  static const char    text[] = "CellCenter";
-  static const int64_t size   = sizeof text - 1;
+  const char   *text = c->file->location;
+  const int64_t size = (int64_t)strlen(text);
 
   return rc_plan_add(c->plan, parent, "GridLocation", "GridLocation_t", "C1", 1, &size, 'C', text) < 0
              ? rc_no_memory(c->message)
@@ -253,7 +253,7 @@ static rcgns_status copy_node(change *c, int64_t node, int64_t parent)
   return solution < 0 ? new_solution(c, zone, at) : RCGNS_OK;
 }
 
-/* May the node of that name take CellCenter fields? */
+/* May the node of that name take fields of the file's location? */
 static rcgns_status check_solution(const change *c, int64_t zone)
 {
   const rc_tree *tree  = &c->file->tree;
@@ -269,7 +269,7 @@ static rcgns_status check_solution(const change *c, int64_t zone)
   rc_tree_string(tree, rc_tree_find(tree, node, -1, "GridLocation_t", NULL), location, sizeof location);
   for (int64_t i = -1; (i = rc_tree_find(tree, node, i, "DataArray_t", NULL)) >= 0;)
     empty = empty && !rc_node_at(tree, i)->kind;
-  if ((*location || !empty) && strcmp(location, "CellCenter"))
+  if ((*location || !empty) && strcmp(*location ? location : "Vertex", c->file->location))
     return rc_fail(c->message, RCGNS_USAGE,
                    "%s: zone %s: its solution %s is %s-located: choose another name (--output-solution)", c->file->path, where,
                    c->solution, *location ? location : "Vertex");

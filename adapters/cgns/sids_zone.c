@@ -499,6 +499,10 @@ static rcgns_status read_zone(rcgns_file *file, rc_zone *zone, bool *keep, rcgns
   if (!*keep) return RCGNS_OK;
   for (int64_t i = 0; i < zone->num_face_sections; i++)
     if (zone->face[i].layout == RC_INLINE) RC_TRY(find_cuts(file, zone, zone->face + i, &curved, message));
+  if (curved && rc_is_dual(file))
+    return rc_fail(message, RCGNS_IO,
+                   "%s: zone %s: it has higher-order elements, whose middle nodes have no dual cells: make them linear",
+                   file->path, zone->name);
   if (curved) RC_TRY(rc_note(file, message, "higher-order elements are taken by their corners"));
   return rc_agree(file->comm, find_coordinates(file, zone, message), message);
 }
@@ -557,6 +561,11 @@ static rcgns_status read_base(rcgns_file *file, int64_t base, rc_array *zones, r
       continue;
     }
     zone.first_cell = file->num_cells;
+    if (zones->count) {
+      const rc_zone *before = (const rc_zone *)zones->item + zones->count - 1;
+
+      zone.first_node = before->first_node + before->num_nodes;
+    }
     file->num_cells += zone.num_cells;
     ((rc_zone *)zones->item)[zones->count++] = zone;
   }

@@ -72,7 +72,8 @@ static cli_exit open_file(cli_job *j, remap_side side, cli_failure *why)
   rcgns_message      message;
 
   rcgns_options_default(&how);
-  how.base = options->base[side];
+  how.base     = options->base[side];
+  how.location = options->location;
   if (side == REMAP_SOURCE) {
     how.scale = options->scale;
     if (options->transform) {

@@ -46,6 +46,8 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
     "1+2")                                                                                                                    \
   X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                   \
     "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                          \
+  X(LOCATION, 0, "location", "cell|vertex", OTHER,                                                                            \
+    "where fields are, in both files; default cell; vertex takes the\ncells of the median-dual mesh about the vertices")      \
   X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")     \
   X(STEP, 0, "step", "N|last", OTHER, "or the one of a time step, counted from 1")                                            \
   X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                       \
@@ -104,6 +106,7 @@ static const word nature_words[]    = {{"conserved", REMAP_CONSERVED},
                                        {"volume-mean", REMAP_VOLUME_MEAN},
                                        {"flag", REMAP_FLAG},
                                        {NULL, 0}};
+static const word location_words[]  = {{"cell", RCGNS_CELLS}, {"vertex", RCGNS_VERTICES}, {NULL, 0}};
 static const word faces_words[]     = {{"centre", REMAP_FACES_CENTRE}, {"diagonal", REMAP_FACES_DIAGONAL}, {NULL, 0}};
 static const word uncovered_words[] = {{"keep", REMAP_UNCOVERED_KEEP},
                                        {"nearest", REMAP_UNCOVERED_NEAREST},
@@ -233,6 +236,10 @@ static cli_exit parse_value(const option_row *row, const char *argument, cli_opt
     case KEY_LIMITER:
       CLI_TRY(pick(limiter_words, row, argument, &value, why));
       out->transfer.limiter = (remap_limiter)value;
+      break;
+    case KEY_LOCATION:
+      CLI_TRY(pick(location_words, row, argument, &value, why));
+      out->location = (rcgns_location)value;
       break;
     case KEY_FACES:
       CLI_TRY(pick(faces_words, row, argument, &value, why));

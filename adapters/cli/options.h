@@ -4,6 +4,7 @@
 
 #include "cli.h"
 
+#include <cgns.h>
 #include <remap/remap.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -29,6 +30,7 @@ typedef struct cli_options {
   int64_t        step;            /**< 1 ..; -1 the last; 0 not given */
   double         scale;
   double         min_coverage; /**< of a target cell, 0 .. 1; default 0 */
+  rcgns_location location;     /**< of the fields of both files */
   remap_faces    faces;
   remap_transfer transfer;
   bool           quiet, verbose, help, version;

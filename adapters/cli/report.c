@@ -12,13 +12,14 @@
 
 static const char *const side_word[2] = {"source", "target"};
 
-/* "Base/Zone: cell 7 (counted from 1)" for a global cell; text has room for size bytes. */
+/* "Base/Zone: cell 7 (counted from 1)", or vertex, for a global cell; text has room for size bytes. */
 static const char *cell_words(const rcgns_info *info, int64_t cell, char *text, size_t size)
 {
   int64_t z = info->num_zones - 1;
 
   while (z > 0 && info->zone[z].first_cell > cell) z--;
-  snprintf(text, size, "%s: cell %lld (counted from 1)", info->zone[z].name, (long long)(cell - info->zone[z].first_cell + 1));
+  snprintf(text, size, "%s: %s %lld (counted from 1)", info->zone[z].name, info->location == RCGNS_VERTICES ? "vertex" : "cell",
+           (long long)(cell - info->zone[z].first_cell + 1));
   return text;
 }
 

@@ -46,6 +46,7 @@ static const recipe recipes[] = {
     {.name = "short_field", .n = 2, .high = 1, .fields = 1, .short_field = true},
     {.name = "nan_field", .n = 2, .high = 1, .fields = 1, .nan_field = true},
     {.name = "at_vertices", .n = 2, .high = 1, .fields = 1, .at_vertices = true},
+    {.name = "vertex_old", .n = 3, .low = .5, .high = 1.5, .fields = 7, .at_vertices = true},
     {.name = "zones_overlap", .n = 2, .high = 1, .second_zone = .25},
     {.name = "masked", .n = 4, .high = 1, .fields = 1, .masks = true},
     {.name = "overset", .n = 2, .high = 1, .fields = 1, .masks = true, .second_zone = .5, .hole_column = true},

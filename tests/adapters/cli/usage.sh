@@ -40,7 +40,7 @@ quick "a nature needs a name" "'conserved'" good.cgns mesh.cgns -o out/result.cg
 quick "a nature is of a field" "no field 'Depth'" good.cgns mesh.cgns -o out/result.cgns --nature Tracer=conserved,Depth=flag
 quick "a value to fill with is a number" "fill=VALUE" good.cgns mesh.cgns -o out/result.cgns --on-uncovered fill=x
 quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out/result.cgns --step 1 --solution FlowSolution
-for option in order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
+for option in location=face order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
 for option in priority supermesh gamma cgns-version; do
@@ -48,8 +48,8 @@ for option in priority supermesh gamma cgns-version; do
 done
 
 works 1 --help
-for option in fields nature order limiter faces on-uncovered on-partial solution step output-solution source-base target-base scale \
-  transform check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
+for option in fields nature order limiter faces on-uncovered on-partial location solution step output-solution source-base \
+  target-base scale transform check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
 if grep -E 'priority|supermesh|gamma' stdout; then complain "--help offers too much"; fi
