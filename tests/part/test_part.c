@@ -91,29 +91,45 @@ static void every_invariant_holds(void)
   for_all_worlds(check_invariants);
 }
 
+static bool is_giant(const rm_piece *p, rm_lid cell)
+{
+  return (p->cell_role[cell] & RM_ROLE_GIANT) != 0;
+}
+
 static void check_targets(world *w)
 {
-  const int64_t *copies = count_copies(w, REMAP_TARGET);
-  const rm_lid   here = w->zone->num_cells[REMAP_TARGET];
-  int64_t        num = here, found = 0;
+  const whole    *all    = &w->all[REMAP_TARGET];
+  const rm_piece *p      = &w->part->piece[REMAP_TARGET];
+  const int64_t  *copies = count_copies(w, REMAP_TARGET);
+  const rm_lid    here   = w->zone->num_cells[REMAP_TARGET];
+  int64_t        *giant  = rm_arena_zero(w->in.arena, all->num_cells, sizeof *giant), num = here, found = 0;
 
+  for (rm_lid c = 0; c < p->num_cells; c++) {
+    giant[whole_number(all, p, c)] = is_giant(p, c);
+    RT_CHECK(is_giant(p, c) || p->cell_role[c] == RM_ROLE_SEATED);
+  }
+  RT_EQ(rm_comm_max_i64(&w->in.comm, giant, (int)all->num_cells), REMAP_OK);
   RT_EQ(rm_comm_sum_i64(&w->in.comm, &num, 1), REMAP_OK);
-  for (rm_lid k = 0; k < here; k++)
-    RT_EQ(copies[w->all[REMAP_TARGET].rank_offset[w->in.comm.rank] + w->zone->cell[REMAP_TARGET][k]], 1);
-  for (int64_t i = 0; i < w->all[REMAP_TARGET].num_cells; i++) found += copies[i];
+  for (rm_lid k = 0; k < here; k++) {
+    const int64_t i = all->rank_offset[w->in.comm.rank] + w->zone->cell[REMAP_TARGET][k];
+
+    RT_CHECK(giant[i] || copies[i] == 1);
+  }
+  for (int64_t i = 0; i < all->num_cells; i++) found += giant[i] ? 1 : copies[i];
   RT_EQ(found, num);
 }
 
-static void every_target_of_the_zone_and_no_other_is_on_one_rank(void)
+static void every_target_of_the_zone_and_no_other_is_on_one_rank_or_a_giant(void)
 {
   for_all_worlds(check_targets);
 }
 
-/* Targets are on one rank each, so all pairs are found if the ranks together have as many as there are. */
+/* Every cell of a piece makes a pair there; and the ranks together make as many as there are. */
 static void check_pairs(world *w)
 {
   const whole    *src = &w->all[REMAP_SOURCE], *dst = &w->all[REMAP_TARGET];
   const rm_piece *src_piece = &w->part->piece[REMAP_SOURCE], *dst_piece = &w->part->piece[REMAP_TARGET];
+  bool           *has_pair = rm_arena_zero(w->in.arena, dst_piece->num_cells, sizeof *has_pair);
   int64_t         num_pairs = 0, found = 0;
 
   for (int64_t i = 0; i < src->num_cells; i++)
@@ -122,15 +138,20 @@ static void check_pairs(world *w)
     int64_t mine = 0;
 
     for (rm_lid j = 0; j < dst_piece->num_cells; j++)
-      mine += rm_box_meets(src->box[whole_number(src, src_piece, i)], dst->box[whole_number(dst, dst_piece, j)]);
+      if (rm_box_meets(src->box[whole_number(src, src_piece, i)], dst->box[whole_number(dst, dst_piece, j)]) &&
+          rm_part_makes_pair(w->part, i, j)) {
+        mine++;
+        has_pair[j] = true;
+      }
     RT_CHECK(mine > 0); /* a source cell that meets no target here stays away */
     found += mine;
   }
+  for (rm_lid j = 0; j < dst_piece->num_cells; j++) RT_CHECK(has_pair[j] || !is_giant(dst_piece, j));
   RT_EQ(rm_comm_sum_i64(&w->in.comm, &found, 1), REMAP_OK);
   RT_EQ(found, num_pairs);
 }
 
-static void every_pair_of_cells_with_meeting_boxes_is_on_one_rank(void)
+static void every_pair_of_cells_with_meeting_boxes_is_made_on_one_rank(void)
 {
   for_all_worlds(check_pairs);
 }
@@ -231,7 +252,7 @@ static void skin_stays_skin_and_cut_faces_do_not_become_it(void)
   for_all_worlds(check_skin);
 }
 
-/* Keys of the targets here: *low..*high; none if *low > *high. */
+/* Keys of the small targets here: *low..*high; none if *low > *high. */
 static void key_range(world *w, uint64_t *low, uint64_t *high)
 {
   const rm_piece *p = &w->part->piece[REMAP_TARGET];
@@ -243,6 +264,7 @@ static void key_range(world *w, uint64_t *low, uint64_t *high)
   for (rm_lid c = 0; c < p->num_cells; c++) {
     const uint64_t key = rm_part_key(&zone_frame, w->all[REMAP_TARGET].box[whole_number(&w->all[REMAP_TARGET], p, c)]);
 
+    if (is_giant(p, c)) continue;
     if (key < *low) *low = key;
     if (key > *high) *high = key;
   }
@@ -263,7 +285,7 @@ static void check_intervals(world *w)
   }
 }
 
-static void the_targets_of_a_rank_are_an_interval_of_keys(void)
+static void the_small_targets_of_a_rank_are_an_interval_of_keys(void)
 {
   for_all_worlds(check_intervals);
 }
@@ -405,13 +427,23 @@ static remap_status run_build(world *w, rm_arena *arena)
 
 static remap_status run_stages(world *w, rm_arena *arena)
 {
-  rm_reason reason = {-1, -1, ""};
-  rm_route  route[2];
-  rm_piece  piece;
+  const rm_comm *comm   = &w->in.comm;
+  rm_reason      reason = {-1, -1, ""};
+  rm_routes      routes;
+  rm_piece       piece;
+  rm_cuts        cuts;
+  rm_tags        tags, moved;
+  rm_giants      giants;
+  int64_t       *work[2];
 
-  RM_TRY(rm_part_cut(arena, &w->in.comm, &w->in.frame, w->in.mesh, w->zone, &route[REMAP_TARGET]));
-  RM_TRY(rm_part_match(arena, &w->in.comm, w->in.mesh, w->zone, &route[REMAP_TARGET], &route[REMAP_SOURCE], &reason));
-  return rm_part_ship(w->in.arena, arena, &w->in.comm, w->in.mesh[REMAP_SOURCE], &route[REMAP_SOURCE], &piece, &reason);
+  RM_TRY(rm_part_cut_evenly(arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts));
+  RM_TRY(rm_part_send_tags(arena, arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts, &tags, &reason));
+  RM_TRY(rm_part_find_giants(arena, arena, comm, &tags, &giants));
+  RM_TRY(rm_part_weigh(arena, arena, comm, &w->in.frame, w->in.mesh, &tags, &giants, work));
+  RM_TRY(rm_part_cut_work(arena, comm, &tags, work, &cuts));
+  RM_TRY(rm_part_move_tags(arena, comm, &tags, &cuts, &moved, &reason));
+  RM_TRY(rm_part_match(arena, arena, comm, &cuts, &moved, &giants, &routes));
+  return rm_part_ship(w->in.arena, arena, &w->in.comm, w->in.mesh[REMAP_SOURCE], &routes.of[REMAP_SOURCE], &piece, &reason);
 }
 
 /* Let every allocation of one rank fail in turn until all are passed. */
@@ -450,10 +482,10 @@ static void all_ranks_fail_alike_when_one_is_out_of_memory_on_the_way(void)
   fail_everywhere(run_stages);
 }
 
-RT_MAIN(RT_CASE(every_invariant_holds), RT_CASE(every_target_of_the_zone_and_no_other_is_on_one_rank),
-        RT_CASE(every_pair_of_cells_with_meeting_boxes_is_on_one_rank), RT_CASE(cells_carry_their_home_id_volume_and_centroid),
+RT_MAIN(RT_CASE(every_invariant_holds), RT_CASE(every_target_of_the_zone_and_no_other_is_on_one_rank_or_a_giant),
+        RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_on_one_rank), RT_CASE(cells_carry_their_home_id_volume_and_centroid),
         RT_CASE(the_faces_of_every_cell_enclose_its_volume_and_point_outward),
-        RT_CASE(skin_stays_skin_and_cut_faces_do_not_become_it), RT_CASE(the_targets_of_a_rank_are_an_interval_of_keys),
+        RT_CASE(skin_stays_skin_and_cut_faces_do_not_become_it), RT_CASE(the_small_targets_of_a_rank_are_an_interval_of_keys),
         RT_CASE(equal_grids_are_shared_out_evenly),
         RT_CASE(pairs_are_shared_out_evenly_though_one_grid_is_refined_in_a_corner),
         RT_CASE(the_cut_does_not_depend_on_who_hands_in_what),

@@ -455,6 +455,8 @@ static remap_status finish_cell(work *w, rm_lid i)
 
   for (int k = 0; k < w->num_slots; k++) {
     slot        *s  = &w->slots[k];
+
+    if (!rm_part_makes_pair(w->part, i, s->target)) continue;
     const double vj = fabs(w->part->piece[1].cell_volume[s->target]), noise = rm_moments_noise(w, i, s);
 
     if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
@@ -466,6 +468,7 @@ static remap_status finish_cell(work *w, rm_lid i)
     slot *s = &w->slots[k];
 
     w->slot_of[s->target] = -1;
+    if (!rm_part_makes_pair(w->part, i, s->target)) continue;
     if (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, s))
       RM_TRY(drop_pair(w, i, s));
     else

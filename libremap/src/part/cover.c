@@ -1,5 +1,5 @@
 /* cover -- the part for the supermesh: every rank gets a share of the cells of both meshes that meet, its core, and all cells that
- * touch these, of both meshes. The core is cut along the same curve, at the same places, as the part of rm_part_build; what touches
+ * touch these, of both meshes. The core is cut along the same curve as the part of rm_part_build, evenly by numbers; what touches
  * it is found by boxes. O(n log n) time; besides the part, memory for keys, boxes and routes. */
 #include "part/part_private.h"
 
@@ -22,19 +22,21 @@ static remap_status match(work *w, int side, rm_lid num, const rm_lid *cell, int
   const rm_zone        queried = {{num, 0}, {cell, NULL}};
   const rm_mesh *const pair[2] = {w->mesh[side], w->mesh[held_side]};
 
-  return rm_part_match(w->scratch, w->comm, pair, &queried, held, out, w->reason);
+  return rm_part_touch(w->scratch, w->comm, pair, &queried, held, out, w->reason);
 }
 
 /* The cut of both meshes, at the same keys. Collective. */
 static remap_status cut(work *w, const rm_frame *frame)
 {
-  const rm_mesh *const turned[2] = {w->mesh[1], w->mesh[0]};
-  const rm_zone        turned_zone = {{w->zone->num_cells[1], w->zone->num_cells[0]}, {w->zone->cell[1], w->zone->cell[0]}};
-  rm_frame             zone_frame;
+  rm_frame     zone_frame;
+  rm_cuts      cuts;
+  remap_status mine = REMAP_OK;
 
   RM_TRY(rm_part_frame(w->comm, frame, w->mesh, w->zone, &zone_frame));
-  RM_TRY(rm_part_cut(w->scratch, w->comm, &zone_frame, w->mesh, w->zone, &w->core[1]));
-  return rm_part_cut(w->scratch, w->comm, &zone_frame, turned, &turned_zone, &w->core[0]);
+  RM_TRY(rm_part_cut_evenly(w->scratch, w->comm, &zone_frame, w->mesh, w->zone, &cuts));
+  for (int side = 0; side < 2 && mine == REMAP_OK; side++)
+    mine = rm_part_route_to_seats(w->scratch, w->comm, &zone_frame, w->mesh[side], w->zone, &cuts, &w->core[side]);
+  return rm_comm_agree(w->comm, mine, NULL);
 }
 
 /* Which cells of this rank meet the other mesh. Not collective. */

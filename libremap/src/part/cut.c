@@ -1,29 +1,25 @@
-/* cut -- intervals of Morton keys, one per rank, of even estimated work. The cuts are exact quantiles of the work over all
- * ranks, found by bisecting the range of keys: they depend on the zone's cells and not on who hands them in, and cells of
- * equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all ranks of WAYS - 1 numbers per cut, each a
- * search of the keys. */
+/* cut -- intervals of Morton keys, one per rank: first of even numbers of cells, then of even estimated work.
+ *
+ * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are exact quantiles, depend on the zone's cells and not on
+ * who hands them in, and cells of equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all ranks of
+ * WAYS - 1 numbers per cut, for which a rank walks along its keys once. Tags that lie in order over the ranks are cut by adding up:
+ * O(n) and two small collectives. */
 #include "part/part_private.h"
 
 #include <float.h>
 
-/* Every round divides the range that holds a cut by WAYS; keys have 63 bits. */
-enum { KEY_BITS = 63, WAY_BITS = 3, WAYS = 1 << WAY_BITS, ROUNDS = KEY_BITS / WAY_BITS };
-
-/* This rank's zone cells by key. */
-typedef struct keys {
-  rm_lid    num[2];      /* [side]                                                 */
-  rm_keyed *keyed[2];    /* [side][num[side]] ascending; item is the place in zone */
-  int      *target_rank; /* [num[REMAP_TARGET]] by place in zone                   */
-  int64_t  *next;        /* [comm->size] where the next target of a rank goes      */
-} keys;
+/* Every round divides the range that holds a cut by WAYS. */
+enum { WAY_BITS = 3, WAYS = 1 << WAY_BITS, ROUNDS = RM_KEY_BITS / WAY_BITS };
 
 /* The search for all cuts at once. Cut s lies in [low[s], low[s] + width). */
 typedef struct search {
-  int       num_cuts; /* comm->size - 1                                            */
-  uint64_t  width;
-  uint64_t *low;      /* [num_cuts]                                                */
-  int64_t  *goal;     /* [num_cuts] work that shall lie below the cut              */
-  int64_t  *below;    /* [num_cuts][WAYS - 1] work below the inner probes, all ranks */
+  int64_t         num_keys;
+  const rm_keyed *keyed;    /* [num_keys] this rank's keys, ascending                */
+  int             num_cuts; /* comm->size - 1                                        */
+  uint64_t        width;
+  uint64_t       *low;      /* [num_cuts]                                            */
+  int64_t        *goal;     /* [num_cuts] cells that shall lie below the cut         */
+  int64_t        *below;    /* [num_cuts][WAYS - 1] cells below the inner probes, all ranks */
 } search;
 
 remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], const rm_zone *zone,
@@ -57,129 +53,195 @@ uint64_t rm_part_key(const rm_frame *zone_frame, const double box[6])
   return rm_morton(zone_frame, centre);
 }
 
-/* The keys of the zone's cells of one mesh, ascending. */
-static remap_status sort_keys(rm_arena *arena, const rm_frame *zone_frame, const rm_mesh *mesh, rm_lid num, const rm_lid *cell,
-                              rm_keyed **out)
+int rm_part_seat(const rm_cuts *cuts, uint64_t key)
 {
-  rm_keyed *keyed, *scratch;
-
-  RM_NEW(keyed, arena, num);
-  RM_NEW(scratch, arena, num);
-  for (rm_lid k = 0; k < num; k++) {
-    keyed[k] = (rm_keyed){rm_part_key(zone_frame, mesh->cell_box[cell[k]]), k};
-    RM_ASSERT(keyed[k].key >> KEY_BITS == 0);
-  }
-  rm_sort_keyed(keyed, scratch, num);
-  *out = keyed;
-  return REMAP_OK;
-}
-
-/* How many of the keys are smaller than `key`. */
-static rm_lid num_below(const rm_keyed *keyed, rm_lid num, uint64_t key)
-{
-  rm_lid low = 0, high = num;
+  int low = 0, high = cuts->num;
 
   while (low < high) {
-    const rm_lid mid = low + (high - low) / 2;
+    const int mid = low + (high - low) / 2;
 
-    if (keyed[mid].key < key) low = mid + 1;
+    if (cuts->key[mid] <= key) low = mid + 1;
     else high = mid;
   }
   return low;
 }
 
-/* The estimate of the overlay's work, in pairs, that this rank's cells of keys below `key` cause: as many pairs as they are
- * cells, of both meshes. Where n source and m target cells fill the same place they make between max(n, m) and some eight
- * times as many pairs, so the sum is right to a small factor whichever mesh is finer, and follows the refinement of both from
- * place to place. */
-static int64_t work_below(const keys *k, uint64_t key)
+remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *mesh,
+                                    const rm_zone *zone, const rm_cuts *cuts, rm_route *out)
 {
-  return (int64_t)num_below(k->keyed[REMAP_SOURCE], k->num[REMAP_SOURCE], key) +
-         (int64_t)num_below(k->keyed[REMAP_TARGET], k->num[REMAP_TARGET], key);
-}
+  const rm_lid  num  = zone->num_cells[mesh->side];
+  const rm_lid *cell = zone->cell[mesh->side];
+  int64_t      *next;
+  int          *seat;
 
-/* All that can fail on this rank alone: the sorted keys, and room for the search and for its result. */
-static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
-                            const rm_zone *zone, keys *k, search *s, rm_route *route)
-{
-  for (int side = 0; side < 2; side++) {
-    k->num[side] = zone->num_cells[side];
-    RM_TRY(sort_keys(arena, zone_frame, mesh[side], zone->num_cells[side], zone->cell[side], &k->keyed[side]));
+  RM_NEW(seat, arena, num);
+  RM_NEW(next, arena, comm->size);
+  RM_NEW(out->cell, arena, num);
+  RM_NEW0(out->offset, arena, (int64_t)comm->size + 1);
+  for (rm_lid k = 0; k < num; k++) {
+    seat[k] = rm_part_seat(cuts, rm_part_key(zone_frame, mesh->cell_box[cell[k]]));
+    out->offset[seat[k]]++;
   }
-  RM_NEW(k->target_rank, arena, k->num[REMAP_TARGET]);
-  RM_NEW(k->next, arena, comm->size);
-  s->num_cuts = comm->size - 1;
-  RM_NEW(s->low, arena, s->num_cuts);
-  RM_NEW(s->goal, arena, s->num_cuts);
-  RM_NEW(s->below, arena, (int64_t)s->num_cuts * (WAYS - 1));
-  RM_NEW(route->offset, arena, (int64_t)comm->size + 1);
-  RM_NEW(route->cell, arena, zone->num_cells[REMAP_TARGET]);
+  rm_offsets(out->offset, comm->size);
+  for (int r = 0; r < comm->size; r++) next[r] = out->offset[r];
+  for (rm_lid k = 0; k < num; k++) out->cell[next[seat[k]]++] = cell[k];
   return REMAP_OK;
 }
 
-/* One round: WAYS - 1 probes divide each cut's range evenly; it shrinks to the part before the first probe above the goal. */
-static remap_status narrow(const rm_comm *comm, const keys *k, search *s)
+/* ---- of cells that lie anywhere ----------------------------------------------------------------------------------- */
+
+/* How many of the keys are smaller than `key`, no fewer than from: in steps that double, then by halving, so that a walk along
+ * many keys costs O(1) each where they are dense and O(log n) where they are not. */
+static int64_t num_below(const search *s, int64_t from, uint64_t key)
 {
+  int64_t low = from, step = 1, high;
+
+  while (low + step <= s->num_keys && s->keyed[low + step - 1].key < key) low += step, step *= 2;
+  high = low + step - 1 < s->num_keys ? low + step - 1 : s->num_keys;
+  while (low < high) {
+    const int64_t mid = low + (high - low) / 2;
+
+    if (s->keyed[mid].key < key) low = mid + 1;
+    else high = mid;
+  }
+  return low;
+}
+
+/* The keys of both meshes' cells, ascending, and room for the search. Not collective. */
+static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                            const rm_zone *zone, search *s)
+{
+  rm_keyed *keyed, *spare;
+  int64_t   num = 0;
+
+  s->num_keys = (int64_t)zone->num_cells[0] + zone->num_cells[1];
+  s->num_cuts = comm->size - 1;
+  RM_NEW(keyed, arena, s->num_keys);
+  RM_NEW(spare, arena, s->num_keys);
+  RM_NEW(s->low, arena, s->num_cuts);
+  RM_NEW(s->goal, arena, s->num_cuts);
+  RM_NEW(s->below, arena, (int64_t)s->num_cuts * (WAYS - 1));
+  for (int side = 0; side < 2; side++)
+    for (rm_lid k = 0; k < zone->num_cells[side]; k++) {
+      keyed[num] = (rm_keyed){rm_part_key(zone_frame, mesh[side]->cell_box[zone->cell[side][k]]), num};
+      RM_ASSERT(keyed[num].key >> RM_KEY_BITS == 0);
+      num++;
+    }
+  rm_sort_keyed(keyed, spare, num);
+  s->keyed = keyed;
+  return REMAP_OK;
+}
+
+/* One round: WAYS - 1 probes divide each cut's range evenly; it shrinks to the part before the first probe above the goal. Ranges
+ * of two cuts are the same or apart, so that the probes ascend. */
+static remap_status narrow(const rm_comm *comm, search *s)
+{
+  int64_t at = 0;
+
   s->width /= WAYS;
   for (int i = 0; i < s->num_cuts; i++)
-    for (int j = 1; j < WAYS; j++) s->below[i * (WAYS - 1) + j - 1] = work_below(k, s->low[i] + (uint64_t)j * s->width);
+    for (int j = 0; j < WAYS - 1; j++) {
+      int64_t *below = s->below + (int64_t)i * (WAYS - 1) + j;
+
+      if (i > 0 && s->low[i] == s->low[i - 1]) *below = below[1 - WAYS];
+      else *below = at = num_below(s, at, s->low[i] + (uint64_t)(j + 1) * s->width);
+    }
   RM_TRY(rm_comm_sum_i64(comm, s->below, s->num_cuts * (WAYS - 1)));
   for (int i = 0; i < s->num_cuts; i++) {
     int part = 0;
 
-    while (part < WAYS - 1 && s->below[i * (WAYS - 1) + part] <= s->goal[i]) part++;
+    while (part < WAYS - 1 && s->below[(int64_t)i * (WAYS - 1) + part] <= s->goal[i]) part++;
     s->low[i] += (uint64_t)part * s->width;
   }
   return REMAP_OK;
 }
 
-/* Cut s becomes the greatest key with at most its share of the work below it. Collective. */
-static remap_status find_cuts(const rm_comm *comm, const keys *k, search *s)
+/* The share of `total` that is below cut i. */
+static int64_t goal_of(int64_t total, int size, int i)
 {
-  int64_t total = (int64_t)k->num[REMAP_SOURCE] + k->num[REMAP_TARGET];
-
-  RM_TRY(rm_comm_sum_i64(comm, &total, 1));
-  for (int i = 0; i < s->num_cuts; i++) {
-    s->low[i]  = 0;
-    s->goal[i] = total / comm->size * (i + 1) + total % comm->size * (i + 1) / comm->size;
-  }
-  s->width = UINT64_C(1) << KEY_BITS;
-  for (int round = 0; round < ROUNDS; round++) RM_TRY(narrow(comm, k, s));
-  RM_ASSERT(s->width == 1);
-  return REMAP_OK;
+  return total / size * (i + 1) + total % size * (i + 1) / size;
 }
 
-/* Rank r takes the targets of keys from cut r - 1 up to cut r; the sort by rank leaves their order as it is in the zone. */
-static void route_targets(const rm_comm *comm, const rm_zone *zone, const keys *k, const search *s, rm_route *route)
+remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                                const rm_zone *zone, rm_cuts *out)
 {
-  const rm_keyed *keyed = k->keyed[REMAP_TARGET];
-  const rm_lid    num   = k->num[REMAP_TARGET];
-  rm_lid          begin = 0;
-
-  for (int r = 0; r < comm->size; r++) {
-    const rm_lid end = r < s->num_cuts ? num_below(keyed, num, s->low[r]) : num;
-
-    RM_ASSERT(begin <= end);
-    for (rm_lid i = begin; i < end; i++) k->target_rank[keyed[i].item] = r;
-    route->offset[r] = k->next[r] = begin;
-    begin            = end;
-  }
-  route->offset[comm->size] = num;
-  for (rm_lid i = 0; i < num; i++) route->cell[k->next[k->target_rank[i]]++] = zone->cell[REMAP_TARGET][i];
-}
-
-remap_status rm_part_cut(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
-                         const rm_zone *zone, rm_route *out)
-{
-  keys               k     = {0};
   search             s     = {0};
-  rm_route           route = {0};
-  const remap_status mine  = prepare(arena, comm, zone_frame, mesh, zone, &k, &s, &route);
+  const remap_status mine  = prepare(arena, comm, zone_frame, mesh, zone, &s);
+  int64_t            total = s.num_keys;
 
   RM_TRY(rm_comm_agree(comm, mine, NULL));
   RM_ASSERT(mine == REMAP_OK);
-  RM_TRY(find_cuts(comm, &k, &s));
-  route_targets(comm, zone, &k, &s, &route);
-  *out = route;
+  RM_TRY(rm_comm_sum_i64(comm, &total, 1));
+  for (int i = 0; i < s.num_cuts; i++) {
+    s.low[i]  = 0;
+    s.goal[i] = goal_of(total, comm->size, i);
+  }
+  s.width = UINT64_C(1) << RM_KEY_BITS;
+  for (int round = 0; round < ROUNDS; round++) RM_TRY(narrow(comm, &s));
+  RM_ASSERT(s.width == 1);
+  *out = (rm_cuts){s.num_cuts, s.low};
+  return REMAP_OK;
+}
+
+/* ---- of tags that lie in order ------------------------------------------------------------------------------------ */
+
+/* This rank's tags of both sides by key, and the work of each. */
+static remap_status merge_work(rm_arena *arena, const rm_tags *tags, int64_t *const work[2], rm_keyed **out, int64_t *num)
+{
+  rm_lid    at[2] = {0, 0};
+  rm_keyed *merged;
+
+  *num = (int64_t)tags->num[0] + tags->num[1];
+  RM_NEW(merged, arena, *num);
+  for (int64_t k = 0; k < *num; k++) {
+    const int side = at[0] == tags->num[0] || (at[1] < tags->num[1] && tags->tag[1][at[1]].key < tags->tag[0][at[0]].key);
+
+    merged[k] = (rm_keyed){tags->tag[side][at[side]].key, work[side][at[side]]};
+    at[side]++;
+  }
+  *out = merged;
+  return REMAP_OK;
+}
+
+/* The cuts whose goals lie in this rank's share of the work, which begins behind `before`; key has room for all. Returns their
+ * number. */
+static int find_cuts(const rm_comm *comm, const rm_keyed *merged, int64_t num, int64_t before, int64_t total, uint64_t *key)
+{
+  int found = 0, next = 0;
+
+  while (next < comm->size - 1 && goal_of(total, comm->size, next) < before) next++;
+  for (int64_t k = 0, end; k < num; k = end) {
+    int64_t here = 0;
+
+    for (end = k; end < num && merged[end].key == merged[k].key; end++) here += merged[end].item;
+    for (; next < comm->size - 1 && goal_of(total, comm->size, next) < before + here; next++) {
+      const bool is_before = goal_of(total, comm->size, next) - before < here - here / 2;
+
+      key[found++] = merged[k].key + (is_before ? 0 : 1);
+    }
+    before += here;
+  }
+  return found;
+}
+
+remap_status rm_part_cut_work(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int64_t *const work[2], rm_cuts *out)
+{
+  uint64_t    *mine   = rm_arena_zero(arena, comm->size, sizeof *mine);
+  int64_t     *offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset), num = 0, before = 0, total, found;
+  rm_keyed    *merged = NULL;
+  void        *all;
+  remap_status status = mine && offset ? merge_work(arena, tags, work, &merged, &num) : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(mine && offset);
+  for (int64_t k = 0; k < num; k++) before += merged[k].item;
+  total = before;
+  RM_TRY(rm_comm_sum_i64(comm, &total, 1));
+  RM_TRY(rm_comm_exscan_i64(comm, &before));
+  found = find_cuts(comm, merged, num, before, total, mine);
+  if (total == 0 && comm->rank == 0) found = comm->size - 1; /* no cells: all cuts at 0 */
+  RM_TRY(rm_comm_allgatherv(comm, arena, mine, found, sizeof *mine, offset, &all));
+  RM_ASSERT(offset[comm->size] == comm->size - 1);
+  *out = (rm_cuts){comm->size - 1, all};
   return REMAP_OK;
 }

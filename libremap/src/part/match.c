@@ -1,179 +1,270 @@
-/* match -- which source cells meet which rank's target cells. Every rank gathers the coarse boxes of every rank's targets; the
- * boxes of the source cells that meet those travel there, are held against the targets themselves, and the answers come back.
- * So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
+/* match -- which cells each rank needs, and so which cells each home sends. Pairs are made
+ *
+ *     source   target      at
+ *     any      small       the seat of the target
+ *     small    giant       the seat of the source
+ *     giant    giant       the seat of the target
+ *
+ * A rank needs the targets seated there, the source cells whose boxes they meet, and the other partners of its pairs. Source tags go
+ * to the ranks of whose small targets they meet a coarse box; those are mostly the neighbours along the Morton curve. So no cell is sent in
+ * vain, for 56 bytes per candidate. O(n log n) time. */
 #include "part/part_private.h"
 
-/* Where the targets are: those of this rank by box, those of all ranks by groups. */
-typedef struct targets {
-  int64_t          *recv_offset;             /* [comm->size + 1]                            */
-  const double    (*box)[6];                 /* [recv_offset[comm->size]] of this rank's    */
-  const rm_boxtree *tree;                    /* over them                                   */
-  double            mine[RM_ZONE_BOXES][6];  /* groups of them                              */
-  int               num_mine;
-  int64_t          *group_offset;            /* [comm->size + 1] groups of each rank        */
-  const double    (*group)[6];               /* [group_offset[comm->size]]                  */
-  int              *group_rank;              /* [group_offset[comm->size]]                  */
-  const rm_boxtree *group_tree;              /* over all ranks' groups                      */
-} targets;
+#include <string.h>
 
-/* Send the boxes of a route's cells along it. Collective. recv_offset and *box live in arena. */
-static remap_status send_boxes(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
-                               int64_t **recv_offset, const double (**box)[6])
+/* A source cell that may be wanted elsewhere. */
+typedef struct candidate {
+  int32_t home_rank;
+  rm_lid  cell;
+} candidate;
+
+/* What this rank's decisions rest on. */
+typedef struct here {
+  const rm_comm    *comm;
+  const rm_cuts    *cuts;
+  const rm_tags    *tags;
+  const rm_giants  *giants;
+  rm_lid            num_small;    /* targets seated here that are no giants */
+  const double    (*small)[6];    /* their boxes                            */
+  const rm_boxtree *small_tree;
+  int64_t           num_arrived;
+  const candidate  *arrived;       /* [num_arrived] sources of other seats */
+  const double    (*arrived_box)[6];
+  uint8_t          *is_wanted;     /* [giants->num] */
+} here;
+
+/* A tree over the small targets. Not collective. */
+static remap_status plant(rm_arena *arena, here *h)
 {
-  const int64_t num = route->offset[comm->size];
-  double      (*send)[6];
-  void         *recv;
+  const rm_tags *tags = h->tags;
+  double       (*small)[6];
 
-  send         = rm_arena_alloc(arena, num, sizeof *send);
-  *recv_offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof **recv_offset);
-  RM_TRY(rm_comm_agree(comm, send && *recv_offset ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(send && *recv_offset);
-  for (int64_t k = 0; k < num; k++)
-    for (int d = 0; d < 6; d++) send[k][d] = mesh->cell_box[route->cell[k]][d];
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *send, route->offset, send, *recv_offset, &recv));
-  *box = recv;
-  return REMAP_OK;
+  RM_NEW(small, arena, tags->num[REMAP_TARGET]);
+  RM_NEW0(h->is_wanted, arena, h->giants->num);
+  for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++)
+    if (!tags->tag[REMAP_TARGET][k].is_giant) memcpy(small[h->num_small++], tags->box[REMAP_TARGET][k], sizeof *small);
+  h->small = (const double(*)[6])small;
+  return rm_boxtree_build(arena, h->num_small, h->small, &h->small_tree);
 }
 
-/* The tree and the groups of this rank's targets. Not collective. */
-static remap_status group_targets(rm_arena *arena, const rm_comm *comm, targets *t, rm_reason *reason)
-{
-  const int64_t num = t->recv_offset[comm->size];
+/* ---- candidates --------------------------------------------------------------------------------------------------- */
 
-  if (num > INT32_MAX)
-    return rm_fail(REMAP_TOO_LARGE, reason, REMAP_TARGET, -1, "%lld cells come to one rank; use more ranks", (long long)num);
-  RM_TRY(rm_boxtree_build(arena, (rm_lid)num, t->box, &t->tree));
-  RM_TRY(rm_box_groups(arena, (rm_lid)num, t->box, t->mine, &t->num_mine));
-  RM_NEW(t->group_offset, arena, (int64_t)comm->size + 1);
-  return REMAP_OK;
-}
-
-/* What a source cell's query adds to: the ranks it has met. */
+/* What a source's query adds to: the ranks it has met. */
 typedef struct meeting {
-  const int *group_rank;
-  int64_t   *next;      /* [comm->size] how many cells meet a rank, or where the next one goes */
-  rm_lid    *last_cell; /* [comm->size] the cell that met a rank last                          */
-  rm_lid    *list;      /* where the cells go, or NULL to count                                */
-  rm_lid     cell;      /* the one that asks                                                   */
+  const rm_crowds *crowds;
+  int64_t         *next;      /* [comm->size] how many sources meet a rank, or where the next one goes */
+  rm_lid          *last;      /* [comm->size] the tag that met a rank last                             */
+  rm_lid          *list;      /* where the tags go, or NULL to count                                   */
+  rm_lid           tag;       /* the one that asks                                                     */
 } meeting;
 
-/* A source cell meets a group: it meets the group's rank, which counts once however many of its groups it meets. */
+/* A source meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
 static int meet_rank(void *user, rm_lid item)
 {
-  meeting   *m    = user;
-  const int  rank = m->group_rank[item];
+  meeting      *m    = user;
+  const int64_t rank = m->crowds->crowd[item].rank;
 
-  if (m->last_cell[rank] == m->cell) return 0;
-  m->last_cell[rank] = m->cell;
-  if (m->list) m->list[m->next[rank]] = m->cell;
+  if (m->last[rank] == m->tag) return 0;
+  m->last[rank] = m->tag;
+  if (m->list) m->list[m->next[rank]] = m->tag;
   m->next[rank]++;
   return 0;
 }
 
-/* Every source cell of the zone asks which groups it meets. */
-static void meet_all(const rm_comm *comm, const targets *t, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
+/* Every small source seated here asks which crowds of other ranks it meets. */
+static void meet_all(const here *h, meeting *m)
 {
-  for (int r = 0; r < comm->size; r++) m->last_cell[r] = -1;
-  for (rm_lid k = 0; k < zone->num_cells[REMAP_SOURCE]; k++) {
-    m->cell = zone->cell[REMAP_SOURCE][k];
-    (void)rm_boxtree_query(t->group_tree, t->group, mesh->cell_box[m->cell], meet_rank, m);
+  for (int r = 0; r < h->comm->size; r++) m->last[r] = -1;
+  for (rm_lid k = 0; k < h->tags->num[REMAP_SOURCE]; k++) {
+    if (h->tags->tag[REMAP_SOURCE][k].is_giant) continue;
+    m->tag                    = k;
+    m->last[h->comm->rank] = k;
+    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, h->tags->box[REMAP_SOURCE][k], meet_rank, m);
   }
 }
 
-/* The source cells that meet a group of a rank's targets: counted in a first walk, listed in a second, so that the list needs
- * no more room than it has entries. Not collective. */
-static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, targets *t,
-                                    rm_route *route)
+/* The candidates for other ranks: counted in a first walk, listed in a second, so that the list needs no more room than it has
+ * entries; offset is [comm->size + 1]. Not collective. */
+static remap_status list_candidates(rm_arena *arena, const here *h, const rm_crowds *crowds, int64_t *offset, candidate **out,
+                                    double (**box)[6])
 {
-  const int64_t num_groups = t->group_offset[comm->size];
-  meeting       m          = {0};
+  const int size = h->comm->size;
+  meeting   m    = {.crowds = crowds};
+  rm_lid   *list;
+  int64_t   num;
 
-  RM_REQUIRE(num_groups <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_TRY(rm_boxtree_build(arena, (rm_lid)num_groups, t->group, &t->group_tree));
-  RM_NEW(t->group_rank, arena, num_groups);
-  RM_NEW(m.last_cell, arena, comm->size);
-  RM_NEW(m.next, arena, comm->size);
-  RM_NEW0(route->offset, arena, (int64_t)comm->size + 1);
-  for (int r = 0; r < comm->size; r++)
-    for (int64_t g = t->group_offset[r]; g < t->group_offset[r + 1]; g++) t->group_rank[g] = r;
-  m.group_rank = t->group_rank;
+  RM_NEW(m.last, arena, size);
+  RM_NEW0(m.next, arena, size);
+  meet_all(h, &m);
+  for (int r = 0; r < size; r++) offset[r] = m.next[r];
+  num = rm_offsets(offset, size);
+  RM_NEW(list, arena, num);
+  RM_NEW(*out, arena, num);
+  RM_NEW(*box, arena, num);
+  for (int r = 0; r < size; r++) m.next[r] = offset[r];
+  m.list = list;
+  meet_all(h, &m);
+  for (int64_t k = 0; k < num; k++) {
+    const rm_tag *tag = &h->tags->tag[REMAP_SOURCE][list[k]];
 
-  for (int r = 0; r < comm->size; r++) m.next[r] = 0;
-  meet_all(comm, t, mesh, zone, &m);
-  for (int r = 0; r < comm->size; r++) route->offset[r] = m.next[r];
-  RM_NEW(route->cell, arena, rm_offsets(route->offset, comm->size));
-
-  for (int r = 0; r < comm->size; r++) m.next[r] = route->offset[r];
-  m.list = route->cell;
-  meet_all(comm, t, mesh, zone, &m);
-  return REMAP_OK;
-}
-
-/* For each of n boxes, whether it meets a target of this rank; and room for the offsets of the answers that come back here.
- * Not collective. */
-static remap_status answer_boxes(rm_arena *arena, const rm_comm *comm, const targets *t, int64_t n, const double (*box)[6],
-                                 uint8_t **answer, int64_t **back_offset)
-{
-  RM_NEW(*answer, arena, n);
-  RM_NEW(*back_offset, arena, (int64_t)comm->size + 1);
-  for (int64_t k = 0; k < n; k++)
-    (*answer)[k] = rm_boxtree_meets(t->tree, t->box, box[k]);
-  return REMAP_OK;
-}
-
-/* Shorten a route, in place, to the cells whose answer is yes. */
-static void keep_answered(const rm_comm *comm, rm_route *route, const uint8_t *answer)
-{
-  int64_t begin = 0, kept = 0; /* kept <= what is read */
-
-  for (int r = 0; r < comm->size; r++) {
-    const int64_t end = route->offset[r + 1];
-
-    for (int64_t k = begin; k < end; k++)
-      if (answer[k]) route->cell[kept++] = route->cell[k];
-    begin                = end;
-    route->offset[r + 1] = kept;
+    (*out)[k] = (candidate){tag->home_rank, tag->cell};
+    memcpy((*box)[k], h->tags->box[REMAP_SOURCE][list[k]], sizeof **box);
   }
-}
-
-/* Ask the ranks of a route which of its cells they want. Collective. */
-static remap_status ask(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const targets *t, rm_route *route)
-{
-  const double (*box)[6];
-  int64_t       *asked_offset, *back_offset = NULL; /* [comm->size + 1] of what comes to be answered, and of the answers */
-  uint8_t       *answer = NULL;
-  void          *answers;
-  remap_status   mine;
-
-  RM_TRY(send_boxes(arena, comm, mesh, route, &asked_offset, &box));
-  mine = answer_boxes(arena, comm, t, asked_offset[comm->size], box, &answer, &back_offset);
-  RM_TRY(rm_comm_agree(comm, mine, NULL));
-  RM_ASSERT(mine == REMAP_OK);
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *answer, asked_offset, answer, back_offset, &answers));
-  RM_ASSERT(back_offset[comm->size] == route->offset[comm->size]);
-  keep_answered(comm, route, answers);
   return REMAP_OK;
 }
 
-remap_status rm_part_match(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
-                           const rm_route *target, rm_route *out, rm_reason *reason)
+/* Tell other ranks of sources that may meet their targets. Collective. */
+static remap_status exchange_candidates(rm_arena *arena, here *h, const rm_crowds *crowds)
 {
-  const rm_mesh *source = mesh[REMAP_SOURCE];
-  targets        t     = {0};
-  rm_route       route = {0};
-  void          *group;
-  remap_status   mine;
+  const int    size    = h->comm->size;
+  int64_t     *offset  = rm_arena_alloc(arena, (int64_t)size + 1, sizeof *offset);
+  int64_t     *arrived = rm_arena_alloc(arena, (int64_t)size + 1, sizeof *arrived);
+  candidate   *out     = NULL;
+  double     (*box)[6] = NULL;
+  void        *who, *where;
+  remap_status status = offset && arrived ? list_candidates(arena, h, crowds, offset, &out, &box) : REMAP_NO_MEMORY;
 
-  RM_TRY(send_boxes(arena, comm, mesh[REMAP_TARGET], target, &t.recv_offset, &t.box));
-  mine = group_targets(arena, comm, &t, reason);
-  RM_TRY(rm_comm_agree_reason(comm, mine, reason));
-  RM_ASSERT(mine == REMAP_OK && t.group_offset);
-  RM_TRY(rm_comm_allgatherv(comm, arena, t.mine, t.num_mine, sizeof *t.mine, t.group_offset, &group));
-  t.group = group;
-  mine    = list_candidates(arena, comm, source, zone, &t, &route);
-  RM_TRY(rm_comm_agree(comm, mine, NULL));
-  RM_ASSERT(mine == REMAP_OK);
-  RM_TRY(ask(arena, comm, source, &t, &route));
-  *out = route;
+  RM_TRY(rm_comm_agree(h->comm, status, NULL));
+  RM_ASSERT(offset && arrived);
+  RM_TRY(rm_comm_exchange(h->comm, arena, sizeof *out, offset, out, arrived, &who));
+  RM_TRY(rm_comm_exchange(h->comm, arena, sizeof *box, offset, box, arrived, &where));
+  h->num_arrived = arrived[size];
+  h->arrived     = who;
+  h->arrived_box = where;
+  return REMAP_OK;
+}
+
+/* ---- wants -------------------------------------------------------------------------------------------------------- */
+
+/* The wants of one side, in no order: key is the home's rank and the cell's number there, item the role. */
+typedef struct list {
+  int64_t   num;
+  rm_keyed *want;
+} list;
+
+static void want(list *l, int32_t home_rank, rm_lid cell, int role)
+{
+  l->want[l->num++] = (rm_keyed){(uint64_t)home_rank << 32 | (uint64_t)cell, role};
+}
+
+/* A small source seated here meets a giant: if that is a target, both are wanted here. */
+typedef struct partner {
+  const here *h;
+  bool        met;
+} partner;
+
+static int meet_giant(void *user, rm_lid item)
+{
+  partner *p = user;
+
+  if (p->h->giants->giant[item].side != REMAP_TARGET) return 0;
+  p->met                = true;
+  p->h->is_wanted[item] = 1;
+  return 0;
+}
+
+static void want_small_sources(here *h, list *l)
+{
+  for (rm_lid k = 0; k < h->tags->num[REMAP_SOURCE]; k++) {
+    const rm_tag *tag = &h->tags->tag[REMAP_SOURCE][k];
+    const double *box = h->tags->box[REMAP_SOURCE][k];
+    partner       p   = {h, false};
+
+    if (tag->is_giant) continue;
+    (void)rm_boxtree_query(h->giants->tree, h->giants->box, box, meet_giant, &p);
+    if (p.met || rm_boxtree_meets(h->small_tree, h->small, box)) want(l, tag->home_rank, tag->cell, RM_ROLE_SEATED);
+  }
+  for (int64_t k = 0; k < h->num_arrived; k++)
+    if (rm_boxtree_meets(h->small_tree, h->small, h->arrived_box[k])) want(l, h->arrived[k].home_rank, h->arrived[k].cell, 0);
+}
+
+/* Giant sources that meet a small target here; and both partners of pairs of giants whose target has its seat here. */
+static void want_giants(here *h)
+{
+  const rm_giant *giant = h->giants->giant;
+
+  for (int64_t g = 0; g < h->giants->num; g++)
+    if (giant[g].side == REMAP_SOURCE) {
+      h->is_wanted[g] |= rm_boxtree_meets(h->small_tree, h->small, giant[g].box);
+    } else if (rm_part_seat(h->cuts, giant[g].key) == h->comm->rank) {
+      for (int64_t i = 0; i < h->giants->num; i++)
+        if (giant[i].side == REMAP_SOURCE && rm_box_meets(giant[i].box, giant[g].box)) h->is_wanted[i] = h->is_wanted[g] = 1;
+    }
+}
+
+/* Everything this rank needs. Not collective. */
+static remap_status list_wants(rm_arena *arena, here *h, list l[2])
+{
+  const rm_tags *tags = h->tags;
+
+  RM_NEW(l[REMAP_SOURCE].want, arena, tags->num[REMAP_SOURCE] + h->num_arrived + h->giants->num);
+  RM_NEW(l[REMAP_TARGET].want, arena, h->num_small + h->giants->num);
+  want_giants(h);
+  want_small_sources(h, &l[REMAP_SOURCE]);
+  for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++) {
+    const rm_tag *tag = &tags->tag[REMAP_TARGET][k];
+
+    if (!tag->is_giant) want(&l[REMAP_TARGET], tag->home_rank, tag->cell, RM_ROLE_SEATED);
+  }
+  for (int64_t g = 0; g < h->giants->num; g++) {
+    const rm_giant *giant = &h->giants->giant[g];
+    const bool      sits  = rm_part_seat(h->cuts, giant->key) == h->comm->rank;
+
+    if (h->is_wanted[g]) want(&l[giant->side], giant->home_rank, giant->cell, RM_ROLE_GIANT | (sits ? RM_ROLE_SEATED : 0));
+  }
+  return REMAP_OK;
+}
+
+/* Sort one side's wants by home and number there, and part them into what to ask whom and what it is. Not collective. */
+static remap_status sort_wants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, list *l, int64_t *offset, rm_lid **cell,
+                               uint8_t **role)
+{
+  rm_keyed *spare;
+
+  RM_REQUIRE(l->num <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(spare, scratch, l->num);
+  RM_NEW(*cell, scratch, l->num);
+  RM_NEW(*role, arena, l->num);
+  rm_sort_keyed(l->want, spare, l->num);
+  for (int r = 0; r <= comm->size; r++) offset[r] = 0;
+  for (int64_t k = 0; k < l->num; k++) {
+    offset[l->want[k].key >> 32]++;
+    (*cell)[k] = (rm_lid)(l->want[k].key & INT32_MAX);
+    (*role)[k] = (uint8_t)l->want[k].item;
+  }
+  rm_offsets(offset, comm->size);
+  return REMAP_OK;
+}
+
+/* Ask the homes of one side for the cells on a list. Collective. */
+static remap_status ask(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, list *l, int side, rm_routes *out)
+{
+  int64_t     *offset = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
+  rm_lid      *cell   = NULL;
+  rm_route    *route  = &out->of[side];
+  void        *asked;
+  remap_status status;
+
+  route->offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *route->offset);
+  status = offset && route->offset ? sort_wants(arena, scratch, comm, l, offset, &cell, &out->role[side]) : REMAP_NO_MEMORY;
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *cell, offset, cell, route->offset, &asked));
+  route->cell    = asked;
+  out->num[side] = (rm_lid)l->num;
+  return REMAP_OK;
+}
+
+remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
+                           const rm_giants *giants, rm_routes *out)
+{
+  here      h = {.comm = comm, .cuts = cuts, .tags = tags, .giants = giants};
+  list      l[2] = {{0, NULL}, {0, NULL}};
+  rm_crowds crowds;
+
+  RM_TRY(rm_comm_agree(comm, plant(scratch, &h), NULL));
+  RM_TRY(rm_part_crowds(scratch, comm, tags, REMAP_TARGET, &crowds));
+  RM_TRY(exchange_candidates(scratch, &h, &crowds));
+  RM_TRY(rm_comm_agree(comm, list_wants(scratch, &h, l), NULL));
+  for (int side = 0; side < 2; side++) RM_TRY(ask(arena, scratch, comm, &l[side], side, out));
   return REMAP_OK;
 }

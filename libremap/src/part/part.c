@@ -1,30 +1,59 @@
-/* part -- the stages in order: cut the targets, match the sources, ship both; and the check of what comes out. What a stage needs
- * on the way is dropped before the next, so memory peaks at the product, the routes, and the keys and boxes of the zone or what
- * one mesh sends and receives. */
+/* part -- the stages in order: tags to their seats, giants, weights, cuts of even work, what each rank needs, and the cells
+ * themselves; and the check of what comes out. What a stage needs on the way is dropped before the next, so memory peaks at the product,
+ * the routes, and the tags or what one mesh sends and receives. */
 #include "part/part_private.h"
 
-/* A route without what was needed on the way to it. */
-static remap_status copy_route(rm_arena *arena, int num_ranks, const rm_route *route, rm_route *out)
+/* Weigh the tags where they are, and move them into intervals of even work. Collective. *moved lives in arena. */
+static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                            rm_tags *tags, rm_giants *giants, rm_cuts *cuts, rm_tags *moved, rm_reason *reason)
 {
-  RM_NEW(out->offset, arena, (int64_t)num_ranks + 1);
-  RM_NEW(out->cell, arena, route->offset[num_ranks]);
-  for (int r = 0; r <= num_ranks; r++) out->offset[r] = route->offset[r];
-  for (int64_t k = 0; k < route->offset[num_ranks]; k++) out->cell[k] = route->cell[k];
-  return REMAP_OK;
+  rm_arena    *scratch = rm_arena_new();
+  int64_t     *work[2];
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_find_giants(arena, scratch, comm, tags, giants));
+  RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, zone_frame, mesh, tags, giants, work));
+  RM_GOTO(done, status = rm_part_cut_work(arena, comm, tags, work, cuts));
+  RM_GOTO(done, status = rm_part_move_tags(arena, comm, tags, cuts, moved, reason));
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
+/* The tags of the zone's cells on the ranks where they are of even number. Collective. *out lives in arena. */
+static remap_status seat_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                                const rm_zone *zone, rm_cuts *cuts, rm_tags *out, rm_reason *reason)
+{
+  rm_arena    *scratch = rm_arena_new();
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_cut_evenly(arena, comm, zone_frame, mesh, zone, cuts));
+  RM_GOTO(done, status = rm_part_send_tags(arena, scratch, comm, zone_frame, mesh, zone, cuts, out, reason));
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+/* One rank needs no balance. Collective. */
 static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
                          const rm_mesh *const mesh[2], const rm_zone *zone, rm_routes *out, rm_reason *reason)
 {
-  rm_frame     zone_frame;
-  rm_route     route[2];
-  remap_status mine = REMAP_OK;
+  rm_frame  zone_frame;
+  rm_cuts   cuts;
+  rm_tags   tags, moved;
+  rm_giants giants = {0, NULL, NULL, NULL};
 
   RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
-  RM_TRY(rm_part_cut(scratch, comm, &zone_frame, mesh, zone, &route[REMAP_TARGET]));
-  RM_TRY(rm_part_match(scratch, comm, mesh, zone, &route[REMAP_TARGET], &route[REMAP_SOURCE], reason));
-  for (int side = 0; side < 2 && mine == REMAP_OK; side++) mine = copy_route(arena, comm->size, &route[side], &out->of[side]);
-  return rm_comm_agree(comm, mine, NULL);
+  RM_TRY(seat_evenly(scratch, comm, &zone_frame, mesh, zone, &cuts, &tags, reason));
+  if (comm->size > 1) {
+    RM_TRY(balance(scratch, comm, &zone_frame, mesh, &tags, &giants, &cuts, &moved, reason));
+  } else {
+    RM_TRY(rm_part_know_giants(scratch, 0, NULL, &giants));
+    moved = tags;
+  }
+  return rm_part_match(arena, scratch, comm, &cuts, &moved, &giants, out);
 }
 
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
@@ -51,6 +80,8 @@ remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *m
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh, &routes->of[mesh->side], out, reason));
+  RM_ASSERT(routes->num[mesh->side] == out->num_cells);
+  out->cell_role = routes->role[mesh->side];
 done:
   rm_arena_drop(scratch);
   return status;

@@ -1,10 +1,20 @@
-/* part -- the zone in; out the cells of both meshes that this rank overlays. Target cells are cut into contiguous intervals of
- * the Morton keys of their boxes' centres, at the quantiles of an estimate of their pairs: each goes to exactly one rank. A
- * source cell goes to every rank that has a target cell whose box it meets. */
+/* part -- the zone in; out the cells of both meshes that this rank overlays. The Morton curve through the zone is cut into one
+ * interval per rank, of even estimated work; the interval that holds the centre of a cell's box is the cell's seat. A target cell goes
+ * to its seat, a source cell to every rank that has a target cell whose box it meets.
+ *
+ * A cell that meets a large part of the other mesh (a closed surface, a huge background cell) is a giant: it is replicated to the seats
+ * of the cells it meets, and its pairs are made there. So every pair of cells is made on exactly one rank, and no rank gets all
+ * cells of a mesh because of one cell of the other. */
 #ifndef RM_PART_H
 #define RM_PART_H
 
 #include "zone/zone.h"
+
+/* What a cell is on the rank that overlays it, bits. */
+enum {
+  RM_ROLE_SEATED = 1, /* this rank is its seat                          */
+  RM_ROLE_GIANT  = 2  /* it may be on other ranks too, though it be a target */
+};
 
 /* The cells of one mesh on the rank that overlays them. Read-only once built. Invariants:
  *   every cell's faces are all here; a face between two cells of this piece that came from one rank is listed once;
@@ -23,13 +33,24 @@ typedef struct rm_piece {
   const rm_lid   *cell_home;         /* [num_cells] its number there                                        */
   const double   *cell_volume;       /* [num_cells] as in rm_mesh                                           */
   const double  (*cell_centroid)[3]; /* [num_cells]                                                         */
+  const uint8_t  *cell_role;         /* [num_cells] RM_ROLE_; NULL: no giants                               */
 } rm_piece;
 
 typedef struct rm_part {
   rm_piece piece[2]; /* [side] */
 } rm_part;
 
-/* Which cells go where. Opaque; read-only once made. */
+/* Whether the pair of two cells of the pieces is made on this rank: with a small target at its seat, where it is alone; else at the
+ * seat of the source, or of the target if both are giants. Not collective. */
+static inline bool rm_part_makes_pair(const rm_part *part, rm_lid source, rm_lid target)
+{
+  const uint8_t *of_source = part->piece[0].cell_role, *of_target = part->piece[1].cell_role;
+
+  if (!of_target || !(of_target[target] & RM_ROLE_GIANT)) return true;
+  return ((of_source[source] & RM_ROLE_GIANT ? of_target[target] : of_source[source]) & RM_ROLE_SEATED) != 0;
+}
+
+/* Which cells go where, and what they are there. Opaque; read-only once made. */
 typedef struct rm_routes rm_routes;
 
 /* Choose where the cells of the zone go. Collective. Lives in arena. TOO_LARGE as below. */
@@ -37,8 +58,8 @@ remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *
                           const rm_zone *zone, const rm_routes **out, rm_reason *reason);
 
 /* Send the cells of one mesh there. Collective. The routes may have been made for the same cells in another position. *out lives in
- * arena. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let results depend on it.
- * TOO_LARGE if the piece has 2^31 or more entities. */
+ * arena, its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not
+ * let results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
 remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
                           rm_reason *reason);
 

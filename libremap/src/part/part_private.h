@@ -1,9 +1,22 @@
-/* part_private -- the stages of rm_part_build: cut the targets, match the sources to them, ship both. Each stage ends in one
- * agreement, so its status is the same on every rank. */
+/* part_private -- the stages of rm_part_build. What a rank needs to know of a cell to decide where it is overlaid is its tag, far
+ * smaller than the cell with its faces: tags are sorted along the Morton curve over all ranks, and only then cells move.
+ *
+ *   tag      tags of the zone's cells go to the ranks in whose interval of keys they lie, at first of equal numbers (cut)
+ *   giant    the cells that meet a large part of the other mesh are found, and known to all ranks
+ *   weigh    estimates the work that each cell's pairs make; intervals of equal work are cut, and the tags move on
+ *   match    every rank lists the cells it needs, and asks their homes for them
+ *   ship     cells with their faces and nodes travel
+ *
+ * The part of a supermesh (cover) is cut evenly and matched from the homes (touch).
+ *
+ * Each stage ends in one agreement, so its status is the same on every rank. */
 #ifndef RM_PART_PRIVATE_H
 #define RM_PART_PRIVATE_H
 
 #include "part/part.h"
+
+/* Keys have 63 bits. */
+enum { RM_KEY_BITS = 63 };
 
 /* Which cells of this rank's part of a mesh go where. */
 typedef struct rm_route {
@@ -12,8 +25,63 @@ typedef struct rm_route {
 } rm_route;
 
 struct rm_routes {
-  rm_route of[2]; /* [side] */
+  rm_route of[2];   /* [side] */
+  rm_lid   num[2];  /* [side] cells that come here                                   */
+  uint8_t *role[2]; /* [side][num[side]] RM_ROLE_ of each, in the order they come in */
 };
+
+/* Where the intervals end: rank r has the keys from key[r - 1] up to but not including key[r]; the first and the last rank's are
+ * open. Ascending. */
+typedef struct rm_cuts {
+  int             num; /* comm->size - 1 */
+  const uint64_t *key; /* [num]          */
+} rm_cuts;
+
+/* A cell of the zone. */
+typedef struct rm_tag {
+  uint64_t key;           /* of the centre of its box */
+  int32_t  home_rank;     /* who handed it in         */
+  rm_lid   cell;          /* its number there         */
+  int32_t  num_triangles; /* of its faces, about; a face between two cells counts half */
+  int32_t  is_giant;
+} rm_tag;
+
+/* The tags in this rank's interval. Read-only once sent, but for is_giant. Ascending by key. */
+typedef struct rm_tags {
+  rm_lid   num[2]; /* [side] */
+  rm_tag  *tag[2];
+  double (*box[2])[6];
+} rm_tags;
+
+/* A cell that is replicated to where the small cells are that it meets. */
+typedef struct rm_giant {
+  double   box[6];
+  uint64_t key;
+  int32_t  side, home_rank;
+  rm_lid   cell;
+  int32_t  unused; /* no padding on the wire */
+} rm_giant;
+
+typedef struct rm_giants {
+  rm_lid            num;      /* of both sides, all ranks; the same on every rank */
+  const rm_giant   *giant;    /* [num]                                            */
+  const double    (*box)[6];  /* [num]                                            */
+  const rm_boxtree *tree;     /* over them                                        */
+} rm_giants;
+
+/* Boxes that together hold all tags of one side on every rank. */
+typedef struct rm_crowd {
+  double  box[6];
+  int64_t rank;
+  double  num; /* tags in it, about */
+} rm_crowd;
+
+typedef struct rm_crowds {
+  rm_lid            num;
+  const rm_crowd   *crowd;    /* [num]     */
+  const double    (*box)[6];  /* [num]     */
+  const rm_boxtree *tree;     /* over them */
+} rm_crowds;
 
 /* The frame with its box narrowed to the zone's cells, all ranks: Morton keys then resolve the zone and not what lies around
  * it. Collective. */
@@ -23,18 +91,57 @@ remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_
 /* Morton key of the centre of a cell's box. Not collective. */
 uint64_t rm_part_key(const rm_frame *zone_frame, const double box[6]);
 
-/* Cut the target cells of the zone into one interval of keys per rank, of even work. Collective. *out lives in arena, as does
- * what is needed on the way. */
-remap_status rm_part_cut(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
-                         const rm_zone *zone, rm_route *out);
+/* The rank in whose interval a key is: its seat. Not collective. */
+int rm_part_seat(const rm_cuts *cuts, uint64_t key);
 
-/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target`
- * puts them. Collective. *out lives in arena, as does what is needed on the way. */
-remap_status rm_part_match(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
+/* This rank's cells of the zone to their seats. Not collective. *out lives in arena, as does what is needed on the way. */
+remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *mesh,
+                                    const rm_zone *zone, const rm_cuts *cuts, rm_route *out);
+
+/* Cut the zone's cells of both meshes, as this rank handed them in, into intervals of equal numbers, as exactly as keys differ.
+ * Collective. *out lives in arena, as does what is needed on the way. */
+remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                                const rm_zone *zone, rm_cuts *out);
+
+/* Cut tags, which lie in order over the ranks, into intervals of equal work; work [side][tags->num[side]] is not negative. A tag
+ * goes to the side of the cut on which most of it lies. Collective. *out lives in arena, as does what is needed on the way. */
+remap_status rm_part_cut_work(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int64_t *const work[2], rm_cuts *out);
+
+/* Send the tags of this rank's cells of the zone to their seats. Collective. *out lives in arena, what is needed on the way in
+ * scratch. TOO_LARGE if a rank gets more than it can number. */
+remap_status rm_part_send_tags(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
+                               const rm_mesh *const mesh[2], const rm_zone *zone, const rm_cuts *cuts, rm_tags *out,
+                               rm_reason *reason);
+/* The same for tags that lie in order over the ranks already, by other cuts. */
+remap_status rm_part_move_tags(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_cuts *cuts, rm_tags *out,
+                               rm_reason *reason);
+
+/* Boxes around the tags of a side that are no giants. Collective. *out lives in arena. */
+remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out);
+
+/* Mark the tags of giants, and tell all ranks of them. Collective. *out lives in arena, what is needed on the way in scratch. */
+remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out);
+
+/* These giants, and a tree over them. Not collective. *out borrows giant, [num], the rest lives in arena. */
+remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *giant, rm_giants *out);
+
+/* An estimate of the work that is done at its seat because of each tag, in units of 1/64 of what an edge and a face that cross
+ * cost. Collective. *work[side], [tags->num[side]], live in arena, what is needed on the way in scratch. */
+remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
+                           const rm_mesh *const mesh[2], const rm_tags *tags, const rm_giants *giants, int64_t *work[2]);
+
+/* What every rank needs, as routes of this rank's cells: targets at their seats, the source cells whose boxes they meet, and giants.
+ * Collective. *out lives in arena, what is needed on the way in scratch. */
+remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
+                           const rm_giants *giants, rm_routes *out);
+
+/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target` puts
+ * them. Collective. *out lives in arena, as does what is needed on the way. */
+remap_status rm_part_touch(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
                            const rm_route *target, rm_route *out, rm_reason *reason);
 
-/* Send the cells of a route with their faces and nodes, and put together what arrives. Collective. *out lives in arena, what is
- * needed on the way in scratch. TOO_LARGE if more arrives than a rank can number. */
+/* Send the cells of a route with their faces and nodes, and put together what arrives, but for its roles. Collective. *out lives in
+ * arena, what is needed on the way in scratch. TOO_LARGE if more arrives than a rank can number. */
 remap_status rm_part_ship(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
                           rm_piece *out, rm_reason *reason);
 

@@ -170,17 +170,18 @@ remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6],
   return status;
 }
 
-/* Leaves of at most n / RM_ZONE_BOXES items, rounded up, are reached by log2 RM_ZONE_BOXES halvings at the latest. */
-remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], double (*group)[6], int *num_groups)
+/* Leaves of at most n / m items, rounded up, are reached by log2 m halvings at the latest, m the power of two up to `most`. */
+remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], int *num_groups)
 {
-  const rm_lid leaf_items = n / RM_ZONE_BOXES + (n % RM_ZONE_BOXES > 0);
+  rm_lid leaf_items = n;
   builder      b;
   int          num = 0;
 
+  for (int leaves = 2; leaves <= most; leaves *= 2) leaf_items = n / leaves + (n % leaves > 0);
   RM_TRY(build(scratch, scratch, n, box, leaf_items > 0 ? leaf_items : 1, &b));
   for (rm_lid node = 0; node < b.num_nodes; node++)
     if (b.count[node] > 0) {
-      RM_ASSERT(num < RM_ZONE_BOXES);
+      RM_ASSERT(num < most);
       box_copy(group[num++], b.box[node]);
     }
   *num_groups = num;

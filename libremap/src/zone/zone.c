@@ -1,6 +1,6 @@
 /* zone -- each rank groups its cells of each mesh into at most RM_ZONE_BOXES boxes, all ranks gather them, and a cell is
  * listed if its box meets a box of the other mesh. Every cell of the other mesh lies in one of the boxes, so a cell that is
- * left out meets none of them. O(n log B) time for n cells here and B boxes; B is at most RM_ZONE_BOXES per rank. */
+ * left out meets none of them. O(n log B) time for n cells here and B boxes. */
 #include "zone/zone.h"
 
 /* The groups of one mesh: first this rank's, then, gathered, everybody's. */
@@ -16,7 +16,8 @@ static remap_status group(rm_arena *scratch, const rm_comm *comm, const rm_mesh 
 {
   for (int side = 0; side < 2; side++) {
     RM_NEW(all[side].offset, scratch, comm->size + 1);
-    RM_TRY(rm_box_groups(scratch, mesh[side]->num_cells, mesh[side]->cell_box, all[side].mine, &all[side].num_mine));
+    RM_TRY(rm_box_groups(scratch, mesh[side]->num_cells, mesh[side]->cell_box, rm_zone_boxes(comm->size), all[side].mine,
+                         &all[side].num_mine));
   }
   return REMAP_OK;
 }

@@ -1,0 +1,145 @@
+/* giant -- a cell that meets more than one in GIANT_SHARE times the ranks of the other mesh's cells would bring them all to its
+ * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from the coarse boxes of the other
+ * mesh's tags, of which every rank knows all: O(n log B) time for n tags and B boxes, at most RM_ZONE_BOXES per rank. */
+#include "part/part_private.h"
+
+#include <string.h>
+
+enum {
+  GIANT_SHARE = 8, /* so a rank's work is settled to an eighth at worst, usually far better */
+  FEW_CELLS   = 32 /* no cell that meets fewer is a giant                                   */
+};
+
+/* This rank's boxes of a side, around the tags that are no giants. Not collective. */
+static remap_status group(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowd *mine, int *num_mine)
+{
+  double (*box)[6], group[RM_ZONE_BOXES][6];
+  rm_lid num = 0;
+
+  RM_NEW(box, arena, tags->num[side]);
+  for (rm_lid k = 0; k < tags->num[side]; k++)
+    if (!tags->tag[side][k].is_giant) memcpy(box[num++], tags->box[side][k], sizeof *box);
+  RM_TRY(rm_box_groups(arena, num, (const double(*)[6])box, rm_zone_boxes(comm->size), group, num_mine));
+  for (int g = 0; g < *num_mine; g++) {
+    memcpy(mine[g].box, group[g], sizeof group[g]);
+    mine[g].rank = comm->rank;
+    mine[g].num  = (double)num / *num_mine;
+  }
+  return REMAP_OK;
+}
+
+/* A tree over the crowds. Not collective. */
+static remap_status grow_tree(rm_arena *arena, int64_t num, const rm_crowd *crowd, rm_crowds *out)
+{
+  double (*box)[6];
+
+  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(box, arena, num);
+  for (int64_t g = 0; g < num; g++) memcpy(box[g], crowd[g].box, sizeof *box);
+  *out = (rm_crowds){.num = (rm_lid)num, .crowd = crowd, .box = (const double(*)[6])box};
+  return rm_boxtree_build(arena, (rm_lid)num, out->box, &out->tree);
+}
+
+remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out)
+{
+  rm_crowd    *mine     = rm_arena_alloc(arena, RM_ZONE_BOXES, sizeof *mine);
+  int64_t     *offset   = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset);
+  int          num_mine = 0;
+  void        *all;
+  remap_status status = mine && offset ? group(arena, comm, tags, side, mine, &num_mine) : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(mine && offset);
+  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num_mine, sizeof *mine, offset, &all));
+  return rm_comm_agree(comm, grow_tree(arena, offset[comm->size], all, out), NULL);
+}
+
+/* How many of the crowds' cells a box meets, about: of each crowd the part of its box that it covers. */
+typedef struct tally {
+  const rm_crowds *crowds;
+  const double    *box;
+  double           num;
+} tally;
+
+static int add_crowd(void *user, rm_lid item)
+{
+  tally          *t     = user;
+  const rm_crowd *crowd = &t->crowds->crowd[item];
+  double          part  = crowd->num;
+
+  for (int d = 0; d < 3; d++) {
+    const double low  = crowd->box[d] > t->box[d] ? crowd->box[d] : t->box[d];
+    const double high = crowd->box[3 + d] < t->box[3 + d] ? crowd->box[3 + d] : t->box[3 + d];
+
+    if (crowd->box[3 + d] > crowd->box[d]) part *= (high - low) / (crowd->box[3 + d] - crowd->box[d]);
+  }
+  t->num += part;
+  return 0;
+}
+
+/* Mark the giants of a side among this rank's tags, held against the crowds of the other side; returns how many there are. */
+static int64_t mark_giants(const rm_comm *comm, const rm_crowds *other, int side, rm_tags *tags)
+{
+  double  total = 0, most;
+  int64_t found = 0;
+
+  for (rm_lid g = 0; g < other->num; g++) total += other->crowd[g].num;
+  most = total / ((double)GIANT_SHARE * comm->size);
+  if (most < FEW_CELLS) most = FEW_CELLS;
+  for (rm_lid k = 0; k < tags->num[side]; k++) {
+    tally t = {other, tags->box[side][k], 0};
+
+    (void)rm_boxtree_query(other->tree, other->box, t.box, add_crowd, &t);
+    tags->tag[side][k].is_giant = t.num > most;
+    found += t.num > most;
+  }
+  return found;
+}
+
+/* This rank's giants. Not collective. */
+static remap_status list_giants(rm_arena *scratch, const rm_tags *tags, int64_t num, rm_giant **out)
+{
+  int64_t   n = 0;
+  rm_giant *giant;
+
+  RM_NEW(giant, scratch, num);
+  for (int side = 0; side < 2; side++)
+    for (rm_lid k = 0; k < tags->num[side]; k++) {
+      const rm_tag *tag = &tags->tag[side][k];
+
+      if (!tag->is_giant) continue;
+      giant[n] = (rm_giant){.key = tag->key, .side = side, .home_rank = tag->home_rank, .cell = tag->cell};
+      memcpy(giant[n++].box, tags->box[side][k], sizeof giant->box);
+    }
+  RM_ASSERT(n == num);
+  *out = giant;
+  return REMAP_OK;
+}
+
+remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *giant, rm_giants *out)
+{
+  double (*box)[6];
+
+  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(box, arena, num);
+  for (int64_t g = 0; g < num; g++) memcpy(box[g], giant[g].box, sizeof *box);
+  *out = (rm_giants){(rm_lid)num, giant, (const double(*)[6])box, NULL};
+  return rm_boxtree_build(arena, out->num, out->box, &out->tree);
+}
+
+remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out)
+{
+  int64_t     *offset = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset), num = 0;
+  rm_giant    *mine   = NULL;
+  rm_crowds    crowds[2];
+  void        *all;
+  remap_status status = offset ? REMAP_OK : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(offset);
+  for (int side = 0; side < 2; side++) RM_TRY(rm_part_crowds(scratch, comm, tags, side, &crowds[side]));
+  for (int side = 0; side < 2; side++) num += mark_giants(comm, &crowds[1 - side], side, tags);
+  RM_TRY(rm_comm_agree(comm, list_giants(scratch, tags, num, &mine), NULL));
+  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num, sizeof *mine, offset, &all));
+  return rm_comm_agree(comm, rm_part_know_giants(arena, offset[comm->size], all, out), NULL);
+}

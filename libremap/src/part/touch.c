@@ -1,0 +1,179 @@
+/* touch -- which cells of a mesh meet which rank's cells of another, or of the same. Every rank gathers the coarse boxes of what every
+ * rank holds; the boxes of the cells that meet those travel there, are held against the cells themselves, and the answers come back.
+ * So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
+#include "part/part_private.h"
+
+/* Where the targets are: those of this rank by box, those of all ranks by groups. */
+typedef struct targets {
+  int64_t          *recv_offset;             /* [comm->size + 1]                            */
+  const double    (*box)[6];                 /* [recv_offset[comm->size]] of this rank's    */
+  const rm_boxtree *tree;                    /* over them                                   */
+  double            mine[RM_ZONE_BOXES][6];  /* groups of them                              */
+  int               num_mine;
+  int64_t          *group_offset;            /* [comm->size + 1] groups of each rank        */
+  const double    (*group)[6];               /* [group_offset[comm->size]]                  */
+  int              *group_rank;              /* [group_offset[comm->size]]                  */
+  const rm_boxtree *group_tree;              /* over all ranks' groups                      */
+} targets;
+
+/* Send the boxes of a route's cells along it. Collective. recv_offset and *box live in arena. */
+static remap_status send_boxes(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
+                               int64_t **recv_offset, const double (**box)[6])
+{
+  const int64_t num = route->offset[comm->size];
+  double      (*send)[6];
+  void         *recv;
+
+  send         = rm_arena_alloc(arena, num, sizeof *send);
+  *recv_offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof **recv_offset);
+  RM_TRY(rm_comm_agree(comm, send && *recv_offset ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(send && *recv_offset);
+  for (int64_t k = 0; k < num; k++)
+    for (int d = 0; d < 6; d++) send[k][d] = mesh->cell_box[route->cell[k]][d];
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *send, route->offset, send, *recv_offset, &recv));
+  *box = recv;
+  return REMAP_OK;
+}
+
+/* The tree and the groups of this rank's targets. Not collective. */
+static remap_status group_targets(rm_arena *arena, const rm_comm *comm, targets *t, rm_reason *reason)
+{
+  const int64_t num = t->recv_offset[comm->size];
+
+  if (num > INT32_MAX)
+    return rm_fail(REMAP_TOO_LARGE, reason, REMAP_TARGET, -1, "%lld cells come to one rank; use more ranks", (long long)num);
+  RM_TRY(rm_boxtree_build(arena, (rm_lid)num, t->box, &t->tree));
+  RM_TRY(rm_box_groups(arena, (rm_lid)num, t->box, rm_zone_boxes(comm->size), t->mine, &t->num_mine));
+  RM_NEW(t->group_offset, arena, (int64_t)comm->size + 1);
+  return REMAP_OK;
+}
+
+/* What a source cell's query adds to: the ranks it has met. */
+typedef struct meeting {
+  const int *group_rank;
+  int64_t   *next;      /* [comm->size] how many cells meet a rank, or where the next one goes */
+  rm_lid    *last_cell; /* [comm->size] the cell that met a rank last                          */
+  rm_lid    *list;      /* where the cells go, or NULL to count                                */
+  rm_lid     cell;      /* the one that asks                                                   */
+} meeting;
+
+/* A source cell meets a group: it meets the group's rank, which counts once however many of its groups it meets. */
+static int meet_rank(void *user, rm_lid item)
+{
+  meeting   *m    = user;
+  const int  rank = m->group_rank[item];
+
+  if (m->last_cell[rank] == m->cell) return 0;
+  m->last_cell[rank] = m->cell;
+  if (m->list) m->list[m->next[rank]] = m->cell;
+  m->next[rank]++;
+  return 0;
+}
+
+/* Every source cell of the zone asks which groups it meets. */
+static void meet_all(const rm_comm *comm, const targets *t, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
+{
+  for (int r = 0; r < comm->size; r++) m->last_cell[r] = -1;
+  for (rm_lid k = 0; k < zone->num_cells[REMAP_SOURCE]; k++) {
+    m->cell = zone->cell[REMAP_SOURCE][k];
+    (void)rm_boxtree_query(t->group_tree, t->group, mesh->cell_box[m->cell], meet_rank, m);
+  }
+}
+
+/* The source cells that meet a group of a rank's targets: counted in a first walk, listed in a second, so that the list needs
+ * no more room than it has entries. Not collective. */
+static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, targets *t,
+                                    rm_route *route)
+{
+  const int64_t num_groups = t->group_offset[comm->size];
+  meeting       m          = {0};
+
+  RM_REQUIRE(num_groups <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_TRY(rm_boxtree_build(arena, (rm_lid)num_groups, t->group, &t->group_tree));
+  RM_NEW(t->group_rank, arena, num_groups);
+  RM_NEW(m.last_cell, arena, comm->size);
+  RM_NEW(m.next, arena, comm->size);
+  RM_NEW0(route->offset, arena, (int64_t)comm->size + 1);
+  for (int r = 0; r < comm->size; r++)
+    for (int64_t g = t->group_offset[r]; g < t->group_offset[r + 1]; g++) t->group_rank[g] = r;
+  m.group_rank = t->group_rank;
+
+  for (int r = 0; r < comm->size; r++) m.next[r] = 0;
+  meet_all(comm, t, mesh, zone, &m);
+  for (int r = 0; r < comm->size; r++) route->offset[r] = m.next[r];
+  RM_NEW(route->cell, arena, rm_offsets(route->offset, comm->size));
+
+  for (int r = 0; r < comm->size; r++) m.next[r] = route->offset[r];
+  m.list = route->cell;
+  meet_all(comm, t, mesh, zone, &m);
+  return REMAP_OK;
+}
+
+/* For each of n boxes, whether it meets a target of this rank; and room for the offsets of the answers that come back here.
+ * Not collective. */
+static remap_status answer_boxes(rm_arena *arena, const rm_comm *comm, const targets *t, int64_t n, const double (*box)[6],
+                                 uint8_t **answer, int64_t **back_offset)
+{
+  RM_NEW(*answer, arena, n);
+  RM_NEW(*back_offset, arena, (int64_t)comm->size + 1);
+  for (int64_t k = 0; k < n; k++)
+    (*answer)[k] = rm_boxtree_meets(t->tree, t->box, box[k]);
+  return REMAP_OK;
+}
+
+/* Shorten a route, in place, to the cells whose answer is yes. */
+static void keep_answered(const rm_comm *comm, rm_route *route, const uint8_t *answer)
+{
+  int64_t begin = 0, kept = 0; /* kept <= what is read */
+
+  for (int r = 0; r < comm->size; r++) {
+    const int64_t end = route->offset[r + 1];
+
+    for (int64_t k = begin; k < end; k++)
+      if (answer[k]) route->cell[kept++] = route->cell[k];
+    begin                = end;
+    route->offset[r + 1] = kept;
+  }
+}
+
+/* Ask the ranks of a route which of its cells they want. Collective. */
+static remap_status ask(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const targets *t, rm_route *route)
+{
+  const double (*box)[6];
+  int64_t       *asked_offset, *back_offset = NULL; /* [comm->size + 1] of what comes to be answered, and of the answers */
+  uint8_t       *answer = NULL;
+  void          *answers;
+  remap_status   mine;
+
+  RM_TRY(send_boxes(arena, comm, mesh, route, &asked_offset, &box));
+  mine = answer_boxes(arena, comm, t, asked_offset[comm->size], box, &answer, &back_offset);
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *answer, asked_offset, answer, back_offset, &answers));
+  RM_ASSERT(back_offset[comm->size] == route->offset[comm->size]);
+  keep_answered(comm, route, answers);
+  return REMAP_OK;
+}
+
+remap_status rm_part_touch(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
+                           const rm_route *target, rm_route *out, rm_reason *reason)
+{
+  const rm_mesh *source = mesh[REMAP_SOURCE];
+  targets        t     = {0};
+  rm_route       route = {0};
+  void          *group;
+  remap_status   mine;
+
+  RM_TRY(send_boxes(arena, comm, mesh[REMAP_TARGET], target, &t.recv_offset, &t.box));
+  mine = group_targets(arena, comm, &t, reason);
+  RM_TRY(rm_comm_agree_reason(comm, mine, reason));
+  RM_ASSERT(mine == REMAP_OK && t.group_offset);
+  RM_TRY(rm_comm_allgatherv(comm, arena, t.mine, t.num_mine, sizeof *t.mine, t.group_offset, &group));
+  t.group = group;
+  mine    = list_candidates(arena, comm, source, zone, &t, &route);
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
+  RM_TRY(ask(arena, comm, source, &t, &route));
+  *out = route;
+  return REMAP_OK;
+}
