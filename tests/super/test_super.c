@@ -9,6 +9,7 @@ enum { UNION = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET };
 typedef struct world {
   remap_context       *ctx;
   tm_mesh             *mine[2];
+  remap_faces          faces;
   remap_supermesh_view v;
 } world;
 
@@ -28,7 +29,7 @@ static void open_world(world *w, MPI_Comm comm, const plan *p)
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &size);
   remap_options_default(&how);
-  how.faces = p->faces;
+  how.faces = w->faces = p->faces;
   memset(&w->v, 0, sizeof w->v);
   RT_EQ(remap_create(comm, &how, &w->ctx), REMAP_OK);
   for (int side = 0; side < 2; side++) {
@@ -95,22 +96,79 @@ static void is_a_mesh(const remap_supermesh_view *v)
   free(list), free(used);
 }
 
-/* On one rank numbers are places, and every cell has its volume: those of the given cells, once each, for the union. */
+/* Twice the area vector of a face. */
+static void area_vector(const remap_supermesh_view *v, int64_t f, double out[3])
+{
+  const int32_t *node = v->face_node + v->face_offset[f];
+  const double  *o    = v->node_xyz + 3 * (int64_t)node[0];
+
+  out[0] = out[1] = out[2] = 0;
+  for (int64_t k = 1; k + 1 < v->face_offset[f + 1] - v->face_offset[f]; k++) {
+    double a[3], b[3];
+    for (int c = 0; c < 3; c++) a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
+    for (int c = 0; c < 3; c++) out[c] += a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+  }
+}
+
+/* Volumes of cells by the cones of their faces from a node of each. */
+static double *volumes_by_faces(const remap_supermesh_view *v)
+{
+  double  *volume = tm_alloc_(v->num_cells, sizeof *volume), a[3];
+  int32_t *origin = tm_alloc_(v->num_cells, sizeof *origin);
+
+  for (int64_t c = 0; c < v->num_cells; c++) origin[c] = -1;
+  for (int64_t f = 0; f < v->num_faces; f++) {
+    const int32_t cell[2] = {v->face_owner[f], v->face_neighbour[f]}, first = v->face_node[v->face_offset[f]];
+    area_vector(v, f, a);
+    for (int h = 0; h < 2; h++) {
+      if (cell[h] < 0) continue;
+      if (origin[cell[h]] < 0) origin[cell[h]] = first;
+      const double *o = v->node_xyz + 3 * (int64_t)origin[cell[h]], *p = v->node_xyz + 3 * (int64_t)first;
+      for (int c = 0; c < 3; c++) volume[cell[h]] += (h ? -1 : 1) * a[c] * (p[c] - o[c]) / 6;
+    }
+  }
+  free(origin);
+  return volume;
+}
+
+/* On one rank: numbers are places; by ancestors the volumes of the union are those of the pairs and of the given cells, to 1e-12 of the
+ * smaller cell. */
 static void is_the_union(const world *w)
 {
   const remap_supermesh_view *v = &w->v;
+  const int64_t               n[2] = {w->mine[0]->view.num_cells, w->mine[1]->view.num_cells};
+  double                     *own[2], *sum[2], *pair = tm_alloc_(n[0] * n[1], sizeof *pair), worst = 0;
+  remap_context              *moments;
+  remap_pairs_view            p;
+  remap_options               how;
 
-  RT_EQ(v->num_beyond, 0);
-  RT_CHECK(v->num_cells == v->global_cells && v->num_faces == v->global_faces && v->num_nodes == v->global_nodes);
+  RT_CHECK(v->num_cells == v->global_cells && v->num_faces == v->global_faces && v->num_nodes == v->global_nodes && v->num_beyond == 0);
   for (int64_t k = 0; k < v->num_cells; k++) RT_EQ(v->cell_global[k], k);
+  remap_options_default(&how);
+  how.faces = w->faces;
+  RT_EQ(remap_create(MPI_COMM_SELF, &how, &moments), REMAP_OK);
+  for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(moments, side, &w->mine[side]->view), REMAP_OK);
+  RT_EQ(remap_build(moments), REMAP_OK);
+  RT_EQ(remap_pairs(moments, REMAP_FORWARD, &p), REMAP_OK);
   for (int side = 0; side < 2; side++) {
-    const int64_t n   = w->mine[side]->view.num_cells;
-    double       *sum = tm_alloc_(n, sizeof *sum), *own = tm_alloc_(n, sizeof *own);
-
-    RT_EQ(remap_build(w->ctx), REMAP_OK);
-    RT_EQ(remap_cells(w->ctx, side, own, NULL), REMAP_OK);
-    free(sum), free(own);
+    own[side] = tm_alloc_(n[side], sizeof(double)), sum[side] = tm_alloc_(n[side], sizeof(double));
+    RT_EQ(remap_cells(moments, side, own[side], NULL), REMAP_OK);
   }
+  for (int64_t c = 0; c < v->num_cells; c++) {
+    const int64_t a = v->cell_ancestor[0][c], b = v->cell_ancestor[1][c];
+    if (a >= 0) sum[0][a] += v->cell_volume[c];
+    if (b >= 0) sum[1][b] += v->cell_volume[c];
+    if (a >= 0 && b >= 0) pair[a * n[1] + b] += v->cell_volume[c];
+  }
+  for (int64_t t = 0; t < p.num_rows; t++)
+    for (int64_t k = p.row_offset[t]; k < p.row_offset[t + 1]; k++) pair[p.global_cell[k] * n[1] + t] -= p.volume[k];
+  for (int64_t k = 0; k < n[0] * n[1]; k++) worst = fmax(worst, fabs(pair[k]) / fmin(own[0][k / n[1]], own[1][k % n[1]]));
+  RT_NEAR(worst, 0, 1e-12);
+  for (int side = 0; side < 2; side++)
+    for (int64_t c = 0; c < n[side]; c++) RT_NEAR(sum[side][c], own[side][c], 1e-12 * own[side][c]);
+  for (int side = 0; side < 2; side++) free(own[side]), free(sum[side]);
+  remap_destroy(&moments);
+  free(pair);
 }
 
 /* ---- several ranks ------------------------------------------------------------------------------------------------------------- */
@@ -200,4 +258,131 @@ static void one_rank_and_many_make_the_same(void)
   }
 }
 
-RT_MAIN(RT_CASE(one_rank_and_many_make_the_same))
+/* A small target in a warped source in two zones, most of which it does not meet. */
+static tm_mesh *small_in_large(int side, uint64_t seed)
+{
+  static const double small[12] = {.3, .05, 0, .3, -.05, .3, 0, .35, 0, 0, .3, .3};
+  const tm_warping    warp      = {.02, .3 * (double)seed};
+  tm_mesh            *m;
+
+  if (side == 0) return seed % 2 ? tm_two_zones((int[]){4, 7, 6}, (int[]){5, 7, 6}, 0, tm_warp, &warp) : tm_hexahedra((int[]){9, 7, 8}, tm_warp, &warp);
+  m = tm_tetrahedra((int[]){3, 3, 2}, NULL, NULL);
+  tm_move(m, tm_affine, small);
+  return m;
+}
+
+static void cells_that_meet_nothing_pass_through(void)
+{
+  for (uint64_t seed = 1; seed <= 4; seed++) {
+    const plan p = {small_in_large, seed, seed % 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, {seed == 4 ? REMAP_IN_SOURCE : UNION, 0, 0, 1}, false};
+    world      w;
+    int64_t    whole = 0;
+
+    look(&p);
+    open_world(&w, MPI_COMM_SELF, &p);
+    for (int64_t f = 0; f < w.v.num_faces; f++) /* a face of four nodes that is warped is as it was given */
+      whole += w.v.face_offset[f + 1] - w.v.face_offset[f] == 4 && w.v.face_from[1][f] < 0;
+    RT_CHECK(whole > 300);
+    close_world(&w);
+  }
+}
+
+static void pieces_of_warped_faces_come_together(void)
+{
+  for (uint64_t seed = 1; seed <= 4; seed++) {
+    plan    p = {seed == 4 ? small_in_large : warped, seed, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, {UNION, 0, 0, 1}, false};
+    world   w;
+    int64_t faces;
+
+    open_world(&w, MPI_COMM_SELF, &p);
+    faces = w.v.num_faces;
+    close_world(&w);
+    p.options.aggregate = 1;
+    look(&p);
+    open_world(&w, MPI_COMM_SELF, &p);
+    RT_CHECK(seed == 3 ? w.v.num_faces == faces : w.v.num_faces < faces); /* all faces of the third are planar */
+    close_world(&w);
+  }
+}
+
+static tm_mesh *same_warped(int side, uint64_t seed)
+{
+  const tm_warping warp = {.03, .1 * (double)seed};
+  (void)side;
+  return tm_hexahedra((int[]){3, 3, 4}, tm_warp, &warp);
+}
+
+static void aggregated_identical_meshes_are_the_mesh(void)
+{
+  for (int faces = 0; faces < 2; faces++) {
+    const plan p = {same_warped, 1, faces ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, {UNION, 1, 0, 1}, false};
+    world      w;
+
+    open_world(&w, MPI_COMM_SELF, &p);
+    RT_EQ(w.v.num_cells, 36);
+    RT_EQ(w.v.num_nodes, 80);
+    RT_EQ(w.v.num_faces, 4 * 12 + 4 * 12 + 5 * 9);
+    for (int64_t c = 0; c < w.v.num_cells; c++) RT_EQ(w.v.cell_ancestor[0][c], w.v.cell_ancestor[1][c]);
+    close_world(&w);
+    look(&p);
+  }
+}
+
+/* No face turns the other way at a node, by more than rounding. */
+static void is_convex(const remap_supermesh_view *v)
+{
+  int64_t concave = 0;
+
+  for (int64_t f = 0; f < v->num_faces; f++) {
+    const int64_t n = v->face_offset[f + 1] - v->face_offset[f];
+    double        a[3];
+
+    area_vector(v, f, a);
+    for (int64_t k = 0; k < n; k++) {
+      const double *x[3];
+      double        u[3], w[3], turn = 0, size = 0;
+      for (int h = 0; h < 3; h++) x[h] = v->node_xyz + 3 * (int64_t)v->face_node[v->face_offset[f] + (k + h) % n];
+      for (int c = 0; c < 3; c++) u[c] = x[1][c] - x[0][c], w[c] = x[2][c] - x[1][c];
+      for (int c = 0; c < 3; c++) {
+        const double cross = u[(c + 1) % 3] * w[(c + 2) % 3] - u[(c + 2) % 3] * w[(c + 1) % 3];
+        turn += cross * a[c], size += fabs(a[c]);
+      }
+      concave += turn < -1e-12 * size;
+    }
+  }
+  RT_EQ(concave, 0);
+}
+
+/* Planar faces, so that polygons have the volumes of the cells, some of them L-shaped. */
+static tm_mesh *planar(int side, uint64_t seed)
+{
+  (void)seed;
+  if (side) return tm_refined((int[]){2, 2, 2}, tm_checkered, NULL, NULL);
+  const double small[12] = {.75, 0, 0, -.1, 0, .75, 0, -.1, 0, 0, .75, -.1};
+  tm_mesh     *m = tm_dual((int[]){2, 2, 2}, NULL, NULL);
+  tm_move(m, tm_affine, small);
+  return m;
+}
+
+static void concave_faces_are_cut(void)
+{
+  plan    p = {planar, 1, REMAP_FACES_CENTRE, {UNION, 0, 0, 1}, false};
+  world   w;
+  int64_t faces;
+
+  open_world(&w, MPI_COMM_SELF, &p);
+  faces = w.v.num_faces;
+  close_world(&w);
+  p.options.split_concave = 1;
+  look(&p);
+  open_world(&w, MPI_COMM_SELF, &p);
+  RT_CHECK(w.v.num_faces > faces);
+  is_convex(&w.v);
+  double *volume = volumes_by_faces(&w.v);
+  for (int64_t c = 0; c < w.v.num_cells; c++) RT_NEAR(volume[c], w.v.cell_volume[c], 1e-12 * w.v.cell_volume[c]);
+  free(volume);
+  close_world(&w);
+}
+
+RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothing_pass_through),
+        RT_CASE(pieces_of_warped_faces_come_together), RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut))

@@ -16,6 +16,8 @@ typedef struct work {
   const rm_cells_choice *choice;
   rm_lid          *new_cell; /* [glued.num_cells] RM_OUTSIDE if it is not kept */
   rm_lid          *loop;     /* of the present group of polygons */
+  rm_parts         parts;    /* of the present face              */
+  remap_status     status;   /* of each_face                     */
   rm_cells        *out;
 } work;
 
@@ -45,7 +47,8 @@ static remap_status make_cells(work *w, rm_reason *reason)
   if (status == REMAP_BAD_MESH)
     rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap or are inverted");
   w->out->seconds_glue = rm_seconds() - start;
-  if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued, &w->faces);
+  if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued,
+                                                  w->choice->aggregate, &w->faces);
   rm_arena_drop(passing);
   w->out->seconds_faces = rm_seconds() - start - w->out->seconds_glue;
   return status;
@@ -104,10 +107,37 @@ typedef struct face {
   bool          turned;
 } face;
 
-/* Call visit for every face of the result. */
-static void each_face(work *w, void (*visit)(work *w, const face *f, void *user), void *user)
+typedef void visitor(work *w, const face *f, void *user);
+
+/* Visit the face, or the convex parts of it if it is concave and that is wanted. Its loop runs counter-clockwise about its triangle's
+ * normal, or the other way (reversed). */
+static void visit_face(work *w, const face *f, bool reversed, visitor *visit, void *user)
 {
-  for (int64_t k = 0; k < w->faces.num; k++) {
+  face part = *f;
+
+  if (!w->choice->split_concave || f->num < 4) {
+    visit(w, f, user);
+    return;
+  }
+  rm_view view = rm_view_of(w->l, f->of->own & 1, f->of->own / 2);
+  if (reversed) view.flip = -view.flip;
+  if (rm_is_convex(&view, f->vertex, f->num)) {
+    visit(w, f, user);
+    return;
+  }
+  w->status = rm_cut_convex(&view, f->num, f->vertex, &w->parts);
+  for (int64_t k = 0; k < w->parts.num && w->status == REMAP_OK; k++) {
+    part.vertex = w->parts.vertex + (k ? w->parts.end[k - 1] : 0);
+    part.num    = w->parts.end[k] - (k ? w->parts.end[k - 1] : 0);
+    visit(w, &part, user);
+  }
+}
+
+/* Visit every face of the result. */
+static remap_status each_face(work *w, visitor *visit, void *user)
+{
+  w->status = REMAP_OK;
+  for (int64_t k = 0; k < w->faces.num && w->status == REMAP_OK; k++) {
     const rm_lid *member = w->faces.member + w->faces.offset[k], first = member[0];
     const int64_t n = w->faces.offset[k + 1] - w->faces.offset[k];
     face          f;
@@ -115,20 +145,22 @@ static void each_face(work *w, void (*visit)(work *w, const face *f, void *user)
     if (!cells_beside(w, first, f.cell, &f.turned)) continue;
     f.num = n > 1 ? rm_face_loop(&w->faces, &w->p, &w->glued, k, w->loop) : 0;
     if (f.num) { /* the loop runs as that of a polygon which is not turned */
+      const bool reversed = rm_is_turned(&w->glued, first);
       f.of     = &w->p.polygon[first];
       f.vertex = w->loop;
-      f.turned = f.turned != rm_is_turned(&w->glued, first);
-      visit(w, &f, user);
+      f.turned = f.turned != reversed;
+      visit_face(w, &f, reversed, visit, user);
       continue;
     }
-    for (int64_t i = 0; i < n; i++) {
+    for (int64_t i = 0; i < n && w->status == REMAP_OK; i++) {
       cells_beside(w, member[i], f.cell, &f.turned);
       f.of     = &w->p.polygon[member[i]];
       f.vertex = w->p.vertex + f.of->first;
       f.num    = rm_polygon_size(f.of);
-      visit(w, &f, user);
+      visit_face(w, &f, false, visit, user);
     }
   }
+  return w->status;
 }
 
 /* Sizes of the result, and which spots it has. */
@@ -195,7 +227,7 @@ static remap_status make_faces(work *w)
   RM_NEW(w->loop, w->scratch, longest);
   RM_NEW0(new_vertex, w->scratch, w->l->num_spots);
   t.used = new_vertex;
-  each_face(w, count_face, &t);
+  RM_TRY(each_face(w, count_face, &t));
   for (rm_lid s = 0; s < w->l->num_spots; s++) out->num_vertices += new_vertex[s];
   RM_NEW(xyz, w->arena, out->num_vertices);
   RM_NEW(spot, w->arena, out->num_vertices);
@@ -205,9 +237,11 @@ static remap_status make_faces(work *w)
     spot[n]       = w->l->spot[s];
     new_vertex[s] = n++;
   }
-  rm_arena_drop(w->limit_arena);
-  w->limit_arena = NULL;
-  w->l           = NULL;
+  if (!w->choice->split_concave) {
+    rm_arena_drop(w->limit_arena);
+    w->limit_arena = NULL;
+    w->l           = NULL;
+  }
   r.new_vertex = new_vertex;
   RM_NEW(r.offset, w->arena, (int64_t)out->num_faces + 1);
   RM_NEW(r.vertex, w->arena, t.corners);
@@ -215,7 +249,7 @@ static remap_status make_faces(work *w)
   RM_NEW(r.beyond, w->arena, out->num_faces);
   RM_NEW(r.triangle, w->arena, out->num_faces);
   r.offset[0] = 0;
-  each_face(w, keep_face, &r);
+  RM_TRY(each_face(w, keep_face, &r));
   out->vertex        = (const double (*)[3])xyz;
   out->vertex_spot   = spot;
   out->face_offset   = r.offset;
@@ -241,6 +275,8 @@ remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overl
   if (status == REMAP_OK) status = make_faces(&w);
   free(w.p.polygon);
   free(w.p.vertex);
+  free(w.parts.vertex);
+  free(w.parts.end);
   rm_arena_drop(w.scratch);
   rm_arena_drop(w.limit_arena);
   if (status != REMAP_OK) return status;

@@ -7,7 +7,8 @@
  *   holes.c     polygons with holes, cut into triangles
  *   arcs.c      edges of polygons, sorted
  *   glue.c      cells: sides of polygons joined around edges
- *   faces.c     pieces of one planar face put together again
+ *   faces.c     pieces of one face put together again
+ *   convex.c    concave polygons cut into convex ones
  *   cells.c     the product; check.c its invariants */
 #ifndef RM_CELLS_PRIVATE_H
 #define RM_CELLS_PRIVATE_H
@@ -137,6 +138,17 @@ remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygo
 remap_status rm_cut_holes(rm_arena *scratch, const rm_view *view, int num_loops, const int64_t *offset, const rm_lid *spot,
                           rm_lid **corner, int64_t *num);
 
+/* Loops, one after the other; malloc'ed, the owner frees both. */
+typedef struct rm_parts {
+  rm_lid *vertex, *end; /* [num_vertices] spots; [num] where each ends */
+  int64_t num_vertices, num, vertex_room, end_room;
+} rm_parts;
+
+/* True if the loop, which runs counter-clockwise in the view, turns right nowhere. Exact. */
+bool rm_is_convex(const rm_view *view, const rm_lid *loop, rm_lid n);
+/* Cut a loop, which runs counter-clockwise, into convex ones; what out held is forgotten. NO_MEMORY. */
+remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, rm_parts *out);
+
 /* ---- edges of polygons ----------------------------------------------------------------------------------------------- */
 
 /* One polygon's edge. */
@@ -177,9 +189,10 @@ typedef struct rm_faces {
   rm_lid        *next;   /* scratch of rm_face_loop, [num_spots]                        */
 } rm_faces;
 
-/* Group coplanar pieces of one face between the same two cells. Lives in arena; passing is for what is not kept. */
+/* Group pieces of one face between the same two cells: coplanar ones; if warped, all whose loop is one of a polygon that some plane
+ * shows without folds, and is not that of another group all around. Lives in arena; passing is for what is not kept. */
 remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs,
-                            const rm_glued *glued, rm_faces *out);
+                            const rm_glued *glued, bool warped, rm_faces *out);
 /* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself nowhere: its
  * members then are faces as they are. */
 rm_lid rm_face_loop(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t k, rm_lid *loop);
