@@ -21,7 +21,7 @@ static void open_job(job *j, tm_mesh *source, tm_mesh *target, tm_dealing deal)
 {
   memset(j, 0, sizeof *j);
   boxes_open(&j->w, MPI_COMM_WORLD, source, target, deal);
-  j->how    = (remap_transfer){2, REMAP_LIMITER_NONE, REMAP_UNCOVERED_KEEP, REMAP_PARTIAL_BLEND, -7.0};
+  j->how    = (remap_transfer){.order = 2, .limiter = REMAP_LIMITER_NONE, .fill_value = -7.0};
   j->in     = rm_arena_alloc(j->w.arena, j->w.mesh[0]->num_cells, sizeof *j->in);
   j->out    = rm_arena_alloc(j->w.arena, j->w.mesh[1]->num_cells, sizeof *j->out);
   j->field  = (remap_field_desc){.name = "rho", .nature = REMAP_CONSERVED, .has_old = 1, .in = j->in, .out = j->out};

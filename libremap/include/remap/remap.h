@@ -52,7 +52,7 @@ extern "C" {
 #define REMAP_STATUS_LIST(X)                                                                  \
   X(OK, 0, "success")                                                                         \
   X(COVERAGE, 1, "target cells are not covered as the caller demands")                        \
-  X(BAD_VALUE, 2, "a field value is not a finite number")                                     \
+  X(BAD_VALUE, 2, "a field value is not a finite number, or a density is not positive")       \
   X(BAD_ARGUMENT, 3, "an argument is out of its documented range")                            \
   X(BAD_ORDER, 4, "a function was called before the one it depends on")                       \
   X(BAD_MESH, 5, "a mesh breaks a documented invariant")                                      \
@@ -88,10 +88,27 @@ typedef enum remap_faces {
 /** What a field is, hence what its transfer conserves. */
 typedef enum remap_nature {
   REMAP_CONSERVED     = 0, /**< amount per volume: the integral of the field is kept */
-  REMAP_MASS_SPECIFIC = 1, /**< amount per mass: treated as VOLUME_MEAN, noted in the report */
+  REMAP_MASS_SPECIFIC = 1, /**< amount per mass: its integral with the density of its system is kept; VOLUME_MEAN without one */
   REMAP_VOLUME_MEAN   = 2, /**< averaged over volume */
   REMAP_FLAG          = 3  /**< a code, never averaged: taken from the cell of largest overlap */
 } remap_nature;
+
+/** What a field is in its system. Fields of a system are carried together, so that what arrives is a state that can be: see
+ *  remap_field_desc.system. */
+typedef enum remap_role {
+  REMAP_ROLE_OTHER         = 0, /**< by nature: CONSERVED an amount per volume, MASS_SPECIFIC one per mass */
+  REMAP_ROLE_DENSITY       = 1, /**< mass per volume; every system has one */
+  REMAP_ROLE_MOMENTUM_X    = 2, /**< momentum per volume */
+  REMAP_ROLE_MOMENTUM_Y    = 3,
+  REMAP_ROLE_MOMENTUM_Z    = 4,
+  REMAP_ROLE_VELOCITY_X    = 5, /**< velocity; of what moves along an axis a system has one, the other, or nothing: then 0 */
+  REMAP_ROLE_VELOCITY_Y    = 6,
+  REMAP_ROLE_VELOCITY_Z    = 7,
+  REMAP_ROLE_ENERGY        = 8,  /**< total energy, internal and kinetic: per volume if CONSERVED, per mass if MASS_SPECIFIC */
+  REMAP_ROLE_PRESSURE      = 9,  /**< of an ideal gas, instead of the energy; needs remap_transfer.gamma */
+  REMAP_ROLE_TEMPERATURE   = 10, /**< likewise; needs gas_constant too */
+  REMAP_ROLE_MASS_FRACTION = 11  /**< as OTHER, one of those that add up to 1: they share a limiter, so that they still do */
+} remap_role;
 
 /** Bounds on the reconstruction inside each giving cell. */
 typedef enum remap_limiter {
@@ -136,6 +153,7 @@ typedef struct remap_options {
   remap_faces faces;     /**< triangulation of faces, both meshes; default REMAP_FACES_CENTRE */
   int         max_order; /**< highest order that remap_field will be asked for: 1, 2 or 3; default 2. 3 costs memory: pairs get
                               second moments */
+  int         systems;  /**< not 0: systems of fields will be moved at order 2, which takes second moments as well; default 0 */
   int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP where zones of one mesh overlap by more
                                           than rounding inside the other mesh; 0 (default): remap_stats tells */
 
@@ -184,9 +202,22 @@ typedef struct remap_transfer {
   remap_on_uncovered on_uncovered; /**< default REMAP_UNCOVERED_KEEP */
   remap_on_partial   on_partial;   /**< default REMAP_PARTIAL_BLEND */
   double             fill_value;   /**< for REMAP_UNCOVERED_FILL; default NaN */
+  double             gamma;        /**< ratio of specific heats of an ideal gas, above 1; default 0: unknown */
+  double             gas_constant; /**< R of p = rho R T; default 0: unknown */
+  int                allow_nan;    /**< not 0: values that are no finite numbers pass, and spoil the cells they reach; default 0 */
+  const double      *rotation;     /**< [3][3] by rows, orthogonal: a vector v of the source is rotation v in the target (backward its
+                                        transpose is used); read when the transfer starts; default NULL: vectors stay as they are */
 } remap_transfer;
 
-/** One field of a call of remap_field. */
+/** One field of a call of remap_field.
+ *
+ *  Fields with the same number `system` > 0 form a system: a density and what moves with the mass. They are reconstructed as
+ *  density, amounts per mass (velocity, others) about the centre of mass, and internal energy, so that velocity, pressure (if given:
+ *  temperature) and amounts per mass stay uniform where they are; then, in the few giving cells where that is not enough, all slopes of the system are scaled down by one factor until every
+ *  receiving cell has positive density, positive internal energy and amounts per mass within the bounds around its givers.
+ *  Mass, momentum, total energy and other amounts are conserved. Velocity, pressure, temperature and MASS_SPECIFIC fields are
+ *  converted, moved as amounts, and converted back; cells that are the same are copied. A transfer with a system of order 2 or 3 is
+ *  collective. Its integrals are those of the amounts: of momentum for a velocity, of total energy for a pressure. */
 typedef struct remap_field_desc {
   const char   *name;    /**< used in messages; may be NULL */
   remap_nature  nature;
@@ -195,6 +226,10 @@ typedef struct remap_field_desc {
   double       *out;     /**< [cells of the receiving mesh on this rank, block after block] borrowed, written */
   int64_t       in_stride, out_stride; /**< doubles from one cell's value to the next one's: n for interleaved q[c * n + k],
                                             with in = q + k; 0 means 1 */
+  int           system;  /**< 0: none */
+  remap_role    role;    /**< read if system is not 0 */
+  int           vector;  /**< 0: none; three fields with the same number > 0 are, in this order, x, y, z of a vector that
+                              remap_transfer.rotation turns; what moves in a system is one by itself */
   const double *const *in_block;  /**< [blocks of the giving mesh] an array per block; NULL: in holds all */
   double *const       *out_block; /**< [blocks of the receiving mesh] likewise                            */
 } remap_field_desc;
@@ -223,6 +258,12 @@ typedef struct remap_field_report {
   double  source_min, source_max, target_min, target_max;
   int64_t limited_cells;      /**< giving cells whose reconstruction the limiter changed; CAAS: receiving cells clipped */
   int64_t order_reduced_cells; /**< giving cells that order 3 found too few neighbours for: order 2 there */
+  int64_t scaled_cells;     /**< giving cells whose slopes the field's system scaled down */
+  int64_t blended_cells;    /**< receiving cells covered in part that keep old content outside */
+  int64_t normalised_cells; /**< likewise with the mean of what covers them: REMAP_PARTIAL_NORMALISE, or no old value */
+  int64_t kept_cells;       /**< receiving cells without overlap that keep their old value */
+  int64_t nearest_cells;    /**< likewise, that got the nearest mapped cell's */
+  int64_t filled_cells;     /**< likewise, that got fill_value */
 } remap_field_report;
 
 /** What remap_build found, over all ranks; the same on every rank but for seconds_transfer. Volumes in the caller's unit cubed. */
@@ -257,7 +298,7 @@ typedef struct remap_pairs_view {
   const double  *volume;     /**< [same] V */
   const double  *moment;     /**< [same][3] integral of (x - c), c the centroid of the giving cell */
   const uint8_t *same;       /**< [same] 1: the two cells cover each other alone */
-  const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 */
+  const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 and no systems */
 } remap_pairs_view;
 
 /** A cell that is covered in part. */
@@ -371,12 +412,12 @@ REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *ma
 
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
  *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields, a
- *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS, and one
+ *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS or a system, and one
  *  with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
  *  exchanges messages with neighbours only and takes no memory: its status is the worst of this rank's own and of those
  *  neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes it one. Values below 1e-280 count
  *  as 0.
- *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value), COVERAGE, NO_MEMORY, MPI_FAILURE. */
+ *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value, a density in a system that is not positive), COVERAGE, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
                                    const remap_field_desc *fields, remap_field_report *reports);
 

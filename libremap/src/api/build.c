@@ -42,7 +42,7 @@ static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const doub
   }
   RM_TRY(rm_context_progress(ctx, "triangulation", 1));
   RM_TRY(rm_overlay_build(arena, ctx->place.trimesh, part, &progress, overlay, reason));
-  RM_TRY(rm_moments_build(arena, part, *overlay, ctx->options.max_order > 2 ? 2 : 1, moments));
+  RM_TRY(rm_moments_build(arena, part, *overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments));
   return rm_context_progress(ctx, "volumes and moments", 1);
 }
 

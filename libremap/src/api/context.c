@@ -65,15 +65,15 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
     return duplicated;
   }
   if (status == REMAP_OK) { /* options agree if their extremes do */
-    int64_t extreme[6] = {ctx->options.faces, ctx->options.max_order, !!ctx->options.zone_overlap_is_error};
-    for (int k = 0; k < 3; k++) extreme[3 + k] = -extreme[k];
-    const remap_status reduced = rm_comm_max_i64(&own, extreme, 6);
-    for (int k = 0; k < 3 && reduced == REMAP_OK; k++)
-      if (extreme[k] != -extreme[3 + k]) status = REMAP_BAD_ARGUMENT;
+    int64_t extreme[8] = {ctx->options.faces, ctx->options.max_order, !!ctx->options.zone_overlap_is_error, !!ctx->options.systems};
+    for (int k = 0; k < 4; k++) extreme[4 + k] = -extreme[k];
+    const remap_status reduced = rm_comm_max_i64(&own, extreme, 8);
+    for (int k = 0; k < 4 && reduced == REMAP_OK; k++)
+      if (extreme[k] != -extreme[4 + k]) status = REMAP_BAD_ARGUMENT;
     if (reduced != REMAP_OK) status = reduced;
   } else {
-    int64_t unused[6] = {0};
-    (void)rm_comm_max_i64(&own, unused, 6);
+    int64_t unused[8] = {0};
+    (void)rm_comm_max_i64(&own, unused, 8);
   }
   status = rm_comm_agree(&own, status, NULL);
   if (status != REMAP_OK) {

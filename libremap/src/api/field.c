@@ -2,6 +2,8 @@
  * that a transfer involves neighbours only and takes no memory. */
 #include "api/context.h"
 
+#include <string.h>
+
 static remap_side giver_of(remap_direction direction) { return direction == REMAP_FORWARD ? REMAP_SOURCE : REMAP_TARGET; }
 
 /* What all ranks pass alike. */
@@ -26,6 +28,11 @@ static remap_status check_agreed(const remap_context *ctx, remap_direction direc
     if (fields[k].nature < REMAP_CONSERVED || fields[k].nature > REMAP_FLAG)
       return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: nature %d is not one of its enum",
                      fields[k].name ? fields[k].name : "?", (int)fields[k].nature);
+  RM_TRY(rm_systems_check(how, num_fields, fields, reason));
+  for (int k = 0; k < num_fields; k++)
+    if (fields[k].system > 0 && how->order > 1 && ctx->options.max_order < 3 && !ctx->options.systems)
+      return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1,
+                     "systems of order 2 need second moments: create the context with systems not 0, or max_order 3");
   return REMAP_OK;
 }
 
@@ -62,11 +69,20 @@ static remap_status check_own(const remap_context *ctx, remap_direction directio
 /* A number that tells this transfer from others that ranks might mistake for it. */
 static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
 {
-  const int words[6] = {(int)direction, how->order, (int)how->limiter, (int)how->on_uncovered, (int)how->on_partial, num_fields};
-  uint64_t  hash     = 0;
+  const int    words[8]  = {(int)direction,         how->order,  (int)how->limiter,    (int)how->on_uncovered,
+                            (int)how->on_partial, num_fields, how->allow_nan != 0, how->rotation != NULL};
+  const double gas[2]    = {how->gamma, how->gas_constant};
+  uint64_t     hash      = 0, bits[2];
 
-  for (int k = 0; k < 6; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
-  for (int k = 0; k < num_fields; k++) hash = rm_hash_word(hash ^ ((uint64_t)fields[k].nature << 1 | (fields[k].has_old != 0)));
+  memcpy(bits, gas, sizeof bits);
+  for (int k = 0; k < 8; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
+  for (int k = 0; k < 2; k++) hash = rm_hash_word(hash ^ bits[k]);
+  for (int k = 0; k < num_fields; k++) {
+    const remap_field_desc *f = &fields[k];
+
+    hash = rm_hash_word(hash ^ ((uint64_t)f->nature << 1 | (f->has_old != 0)));
+    hash = rm_hash_word(hash ^ ((uint64_t)f->system << 32 | (uint64_t)f->vector << 8 | (uint64_t)f->role));
+  }
   return hash;
 }
 
@@ -108,6 +124,7 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction,
                              .giving_rows       = &mapping->rows[giving],
                              .giving_stencil    = is_wide ? *wide_of(ctx, giving) : *stencil_of(ctx, giving, true),
                              .receiving_stencil = *stencil_of(ctx, receiving, false),
+                             .giving_second     = ctx->second[giving],
                              .receiving_second  = ctx->second[receiving],
                              .giving_layout     = ctx->layout[giving],
                              .receiving_layout  = ctx->layout[receiving],
@@ -128,11 +145,10 @@ static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_gi
                           stencil);
 }
 
-/* Second moments of both sides' cells, and the wider stencil of the giving side, whose stencil is there. Collective. */
-static remap_status need_wide(remap_context *ctx, remap_side giving)
+/* Second moments of both sides' cells. Collective. */
+static remap_status need_second(remap_context *ctx)
 {
-  const rm_stencil **wide   = wide_of(ctx, giving);
-  remap_status       status = REMAP_OK;
+  remap_status status = REMAP_OK;
 
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     if (ctx->second[side]) continue;
@@ -140,7 +156,14 @@ static remap_status need_wide(remap_context *ctx, remap_side giving)
     status = !ctx->stencil_arena[side] ? REMAP_NO_MEMORY
                                        : rm_mesh_second(ctx->stencil_arena[side], ctx->mesh[side], ctx->options.faces, &ctx->second[side]);
   }
-  RM_TRY(rm_comm_agree(&ctx->comm, status, NULL));
+  return rm_comm_agree(&ctx->comm, status, NULL);
+}
+
+/* The wider stencil of the giving side, whose stencil and second moments are there. Collective. */
+static remap_status need_wide(remap_context *ctx, remap_side giving)
+{
+  const rm_stencil **wide = wide_of(ctx, giving);
+
   if (*wide) return REMAP_OK;
   return rm_stencil_widen(ctx->gives[giving] ? ctx->mask_arena : ctx->stencil_arena[giving], &ctx->comm, &ctx->frame,
                           ctx->mesh[giving], ctx->second[giving], *stencil_of(ctx, giving, true), wide);
@@ -158,6 +181,7 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
   RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
   if (load.has_nearest) RM_TRY(need_stencil(ctx, 1 - giving, false));
+  if (load.is_wide || load.is_curved) RM_TRY(need_second(ctx));
   if (load.is_wide) RM_TRY(need_wide(ctx, giving));
   const rm_transfer_setup setup = setup_of(ctx, direction, load.is_wide);
   RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));

@@ -11,7 +11,7 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   const rm_rows *rows  = w->setup->rows;
   const uint8_t  cover = rows->cover[cell];
 
-  if (w->packing->order[f] < 2 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]]) return false;
+  if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]]) return false;
   if (!(w->setup->receiving->cell_volume[cell] > 0.0)) return false;
   bounds[0] = INFINITY;
   bounds[1] = -INFINITY;
@@ -25,7 +25,7 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
     bounds[0] = fmin(bounds[0], given[0]);
     bounds[1] = fmax(bounds[1], given[1]);
   }
-  return true;
+  return isfinite(bounds[0]) && isfinite(bounds[1]);
 }
 
 static double clip(double x, const double bounds[2]) { return fmin(fmax(x, bounds[0]), bounds[1]); }
@@ -40,7 +40,7 @@ void rm_caas_sum(const rm_receipt *w, const double *old, rm_sum *sum)
       const double volume = w->setup->receiving->cell_volume[c], value = RM_VALUE_SCALE * w->value[(int64_t)c * num + f];
       double       bounds[2], clipped;
 
-      if (!bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
+      if (!isfinite(value) || !bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
       clipped = clip(value, bounds);
       rm_integral_add(&sum[3 * f], value, volume);
       rm_integral_add(&sum[3 * f], -clipped, volume);
@@ -61,7 +61,7 @@ void rm_caas_settle(const rm_receipt *w, const double *old, const rm_sum *sum, i
       double      *place  = &w->value[(int64_t)c * num + f], bounds[2], settled;
       const double volume = w->setup->receiving->cell_volume[c], value = RM_VALUE_SCALE * *place;
 
-      if (!bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
+      if (!isfinite(value) || !bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
       settled = clip(value, bounds);
       limited[f] += settled < value || settled > value;
       settled += share * ((missing > 0.0 ? bounds[1] : bounds[0]) - settled);

@@ -56,18 +56,24 @@ typedef struct rm_transfer_setup {
   const rm_stencil *giving_stencil; /* NULL if order 1; widened if order 3                           */
   const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
   rm_layout         giving_layout, receiving_layout;
-  const double    (*receiving_second)[6]; /* rm_mesh_second; NULL unless order 3 has cells to normalise */
+  const double    (*giving_second)[6];    /* rm_mesh_second; NULL unless systems have slopes              */
+  const double    (*receiving_second)[6]; /* likewise; NULL unless order 3 has cells to normalise         */
   bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
+
+/* Are roles, vectors and the gas model such that fields can be moved together? BAD_ARGUMENT with the reason. Not collective. */
+remap_status rm_systems_check(const remap_transfer *how, int num_fields, const remap_field_desc *fields, rm_reason *reason);
 
 /* How much a transfer asks of a carrier; the same on every rank. */
 typedef struct rm_load {
   int  num_fields;
   int  width;       /* doubles that travel per giving cell           */
+  int  num_systems;
   bool has_slopes;  /* needs the stencil's halo                       */
   bool is_settled;  /* limiter CAAS: old values and sums are kept     */
   bool is_checked;  /* limiter auto: slopes and roughness travel too    */
   bool is_wide;     /* of the widened stencil, for order 3            */
+  bool is_curved;   /* systems with slopes: second moments of cells   */
   bool has_nearest; /* uncovered cells take the nearest mapped cell's */
 } rm_load;
 

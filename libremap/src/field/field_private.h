@@ -1,9 +1,12 @@
 /* field_private -- between the files of the room.
  *
- *   stencil         vertex neighbours and their weights              leastsq   the weights of one cell
- *   reconstruct     giving cells: value, slope, bounds               nearest   where uncovered cells look
+ *   stencil, widen  neighbours and their weights                     leastsq, quadratic  the weights of one cell
+ *   reconstruct     cells of a mesh: value, slope, bounds            smooth    where a field is smooth
+ *   profile         reconstruction with its messages                 packing   what travels, and where it stands
+ *   system          fields that are converted and moved together     admit     states that can be
+ *   gather          between the caller's arrays and ours             nearest   where uncovered cells look
  *   receive         receiving cells, coverage policies               integral  what was kept, exactly
- *   carrier         all of it in order, in two steps                                                      */
+ *   caas            clipping                                         carrier   all of it in order, in two steps  */
 #ifndef RM_FIELD_PRIVATE_H
 #define RM_FIELD_PRIVATE_H
 
@@ -47,26 +50,56 @@ static const int rm_row_of[6] = {0, 1, 2, 0, 0, 1}, rm_column_of[6] = {0, 1, 2, 
  * stay finite. It changes no digit of what is not below 1e-280. */
 #define RM_VALUE_SCALE 0x1p-64
 
-/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it (at
- * order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own alone); where the field has
- * slopes, three slopes of the scaled value, then, if asked for, least and greatest value around, scaled; at order 3 six
- * coefficients h of the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
+/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it, of a field in
+ * a system the amount per volume (at order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own
+ * alone, whose value is copied as given); where the field has slopes, three slopes of the scaled value, then, if asked for, least
+ * and greatest value around, scaled (of a field in a system: of the amount per mass); where it has curvature six coefficients h of
+ * the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
+
+/* Fields that are moved together, by number; -1: there is none. */
+typedef struct rm_system {
+  int density, motion[3], energy;
+} rm_system;
+
 typedef struct rm_packing {
-  int  num_fields, width;
-  int *at;         /* [num_fields]                           */
-  int *order;      /* [num_fields] 1, 2 or 3                 */
-  bool has_bounds; /* fields of order 2 or 3 carry the bounds */
-  bool is_limited; /* Barth-Jespersen                        */
-  bool is_checked; /* but not in cells that are smooth       */
+  const remap_transfer   *how;
+  const remap_field_desc *fields;
+  int        num_fields, width;
+  int       *at;         /* [num_fields]                                              */
+  int       *order;      /* [num_fields] 1, 2 or 3: of what is reconstructed          */
+  int       *degree;     /* [num_fields] 0, 1 or 2: of the polynomials that travel    */
+  int       *system_of;  /* [num_fields] number in the list, -1: none                 */
+  int        num_systems;
+  rm_system *system;     /* [num_systems]                                             */
+  bool       has_bounds; /* fields of order 2 or 3 carry the bounds                   */
+  bool       is_limited; /* Barth-Jespersen                                           */
+  bool       is_checked; /* but not in cells that are smooth                          */
 } rm_packing;
 enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
 
 /* Place of h after at[f], the constant behind it; and how many places a field takes. */
 static inline int rm_pack_curvature(bool has_bounds) { return has_bounds ? RM_PACK_BOUNDS + 2 : RM_PACK_BOUNDS; }
-static inline int rm_pack_width(int order, bool has_bounds)
+static inline int rm_pack_width(int degree, bool has_bounds)
 {
-  return order == 1 ? 1 : rm_pack_curvature(has_bounds) + (order > 2 ? 7 : 0);
+  return degree == 0 ? 1 : rm_pack_curvature(has_bounds) + (degree > 1 ? 7 : 0);
 }
+
+/* Does a transfer of this order give a field slopes? Of which degree are its polynomials? */
+static inline bool rm_has_slope(const remap_transfer *how, const remap_field_desc *field)
+{
+  return how->order > 1 && field->nature != REMAP_FLAG;
+}
+static inline int rm_degree(const remap_transfer *how, const remap_field_desc *field)
+{
+  return !rm_has_slope(how, field) ? 0 : field->system ? 2 : how->order - 1;
+}
+
+/* Do receiving cells need bounds: all (CAAS, systems), or those in part covered that a reconstruction is taken beyond? */
+bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
+
+/* Lay out a packing whose arrays are there. */
+void rm_packing_fill(rm_packing *packing, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
+                     const remap_field_desc *fields);
 
 /* h:(y z^T) with h as six coefficients of a symmetric form. */
 static inline double rm_form(const double h[6], const double y[3], const double z[3])
@@ -77,6 +110,20 @@ static inline double rm_form(const double h[6], const double y[3], const double 
 static inline double rm_dot6(const double h[6], const double s[6])
 {
   return h[0] * s[0] + h[1] * s[1] + h[2] * s[2] + h[3] * s[3] + h[4] * s[4] + h[5] * s[5];
+}
+
+/* Moments of pair k of a row about a point x instead of its giver's centroid; second ones are 0 where there are none. */
+static inline void rm_moments_about(const rm_rows *rows, int64_t k, const double x[3], double m[3], double second[6])
+{
+  const double *c = rows->giver_centroid[rows->giver[k]], *given = rows->moment[k], volume = rows->volume[k];
+  const double  e[3] = {c[0] - x[0], c[1] - x[1], c[2] - x[2]};
+
+  for (int d = 0; d < 3; d++) m[d] = given[d] + e[d] * volume;
+  for (int i = 0; i < 6; i++) {
+    const int a = rm_row_of[i], b = rm_column_of[i];
+
+    second[i] = rows->second ? rows->second[k][i] + e[a] * given[b] + e[b] * given[a] + e[a] * e[b] * volume : 0.0;
+  }
 }
 
 /* Numbers of the giving cells, [giving cells][num_fields], and of the stencil's halo, [num_halo][num_fields]. */
@@ -107,12 +154,19 @@ void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, do
  * slope stays as it is and curvature is 0. */
 bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7]);
 
-/* Fill the pack, [giving cells][width], of cells whose needs_halo is `which`; limited and reduced [num_fields] grow by the number
- * of cells whose reconstruction the limiter changed, and of those that order 3 has no polynomial for. rough says which cells are
- * not smooth, for a packing that is checked; the halo's numbers are read only for cells that need it. Cells that cover nothing get
- * slope 0. Not collective. */
-void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, rm_numbers given, rm_numbers rough,
-                    const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited, int64_t *reduced);
+/* A mesh whose fields are reconstructed. */
+typedef struct rm_ground {
+  const rm_mesh    *mesh;
+  const rm_stencil *stencil;
+  const rm_rows    *rows;        /* of its cells                                                               */
+  const double    (*second)[6];  /* rm_mesh_second; NULL unless systems have slopes                            */
+} rm_ground;
+
+typedef struct rm_profile rm_profile;
+
+/* Fill the pack of cells whose needs_halo is `which`. The halo's numbers are read only for cells that need it. Cells that cover
+ * nothing get slope 0. Not collective. */
+void rm_reconstruct(const rm_profile *profile, const rm_packing *packing, uint8_t which);
 
 /* ---- smooth ---------------------------------------------------------------------------------------------------- */
 
@@ -128,6 +182,99 @@ void rm_smooth_spread(const rm_stencil *stencil, const rm_packing *packing, rm_n
 
 /* Are a cell and its neighbours all not rough? Not collective. */
 bool rm_is_smooth(const rm_stencil *stencil, rm_lid cell, const rm_around *rough);
+
+/* ---- profile --------------------------------------------------------------------------------------------------- */
+
+/* What is known of how a transfer goes. */
+typedef struct rm_word {
+  rm_note      note;   /* worst status so far                  */
+  remap_status mine;   /* the same without what neighbours told */
+  rm_reason    reason;
+} rm_word;
+
+/* What a step on this rank said; the first failure stays. */
+void rm_word_add(rm_word *word, remap_status status);
+/* Wait for a flow; what its senders say counts. */
+void rm_word_await(rm_word *word, const rm_comm *comm, rm_flow *flow);
+/* One word for all ranks. True if all is well. Collective. */
+bool rm_word_agree(rm_word *word, const rm_comm *comm);
+
+static inline const double *rm_flow_numbers(const rm_flow *flow) { return (const double *)(const void *)flow->received; }
+
+/* profile -- the fields of one mesh reconstructed, again and again. It owns flows and room; values are the carrier's. */
+struct rm_profile {
+  rm_ground     ground;
+  rm_flow       halo;           /* numbers around the stencils                                    */
+  rm_flow       slopes, roughs; /* likewise slopes and roughness, if smooth cells are told from others */
+  double      (*slope)[3];      /* [cells][num_fields]                                            */
+  double       *rough, *spread; /* [cells][num_fields] cells that are rough, and their neighbours too */
+  uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
+  const double *given;          /* [cells][num_fields] values as the caller has them              */
+  const double *number;         /* [cells][num_fields] what is reconstructed: given, or amounts per mass */
+  double       *extreme;        /* [2][num_fields] least number, then greatest, over all ranks: of fields in systems */
+  double       *pack;           /* [cells][width]                                                 */
+  int64_t      *limited;        /* [2][num_fields] cells that the limiter changed; those without a polynomial of order 3 */
+};
+
+/* Flows and room for a load on a ground, but for values. Not collective. Lives in arena. */
+remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *profile);
+/* Does a transfer read the halo? */
+bool rm_profile_reads_halo(const rm_packing *packing);
+/* Send the halo's numbers; then, once all else is done that can be without them, finish: the whole pack. Among neighbours. */
+void rm_profile_post(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
+void rm_profile_finish(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
+/* Wait for what is under way. */
+void rm_profile_abandon(rm_profile *profile, const rm_comm *comm, rm_word *word);
+
+/* ---- system ---------------------------------------------------------------------------------------------------- */
+
+/* Find the systems among the fields of a packing. Fields have passed rm_systems_check. */
+void rm_systems_find(rm_packing *packing);
+
+/* Of one cell, [num_fields] each: what is reconstructed, from what is given (may be the same array); the amount per volume of a
+ * field, from both; what is given, from amounts per volume, in place. Fields outside of systems stay as they are. False if a density
+ * is not positive; *bad is its field then. Is the internal energy of a system reconstructed per mass, not per volume? */
+bool   rm_system_is_energy_per_mass(const rm_packing *packing, int s);
+bool   rm_system_numbers(const rm_packing *packing, const double *given, double *number, int *bad);
+double rm_system_amount(const rm_packing *packing, int f, const double *given, const double *number);
+void   rm_system_restore(const rm_packing *packing, double *value);
+
+/* The polynomials of a system's amounts per volume, of degree 2, from those of density and amounts per mass. place is the cell's in
+ * the pack; second and volume are the cell's moments. The mean over the cell stays its amount. */
+void rm_system_combine(const rm_packing *packing, int s, const double *given, const double *number, const double second[6],
+                       double volume, const double centroid_error[3], double *place);
+
+/* ---- admit ----------------------------------------------------------------------------------------------------- */
+
+/* Least and greatest amount per mass of each field about some place, [num_fields] each, not scaled. */
+typedef struct rm_limits {
+  double *least, *greatest;
+} rm_limits;
+
+/* No limits yet; and those of one more giver, from its place in a pack, for all fields of systems. */
+void rm_limits_clear(const rm_packing *packing, rm_limits limits);
+void rm_limits_add(const rm_packing *packing, const double *place, rm_limits limits);
+
+/* The greatest factor in [0, 1] by which change may be added to content, scaled amounts in a volume, [num_fields] each, so that the
+ * state of a system stays one that can be: density and internal energy above a tenth of the least around, amounts per mass within
+ * limits, up to rounding. Content alone is such a state. slack is what rounding may take, relative. */
+double rm_admit_factor(const rm_packing *packing, int s, const double *content, const double *change, double volume,
+                       rm_limits limits, double slack);
+
+/* admission -- the rounds in which slopes are scaled until every receiving cell's state can be. */
+typedef struct rm_admission {
+  rm_flow  refusals; /* of receiving cells, to their givers           */
+  rm_flow  factors;  /* of giving cells, to those who receive         */
+  uint8_t *refused;  /* [receiving cells][num_systems]                */
+  uint8_t *is_scaled; /* [giving cells][num_systems]                  */
+  double  *factor;   /* [giving cells][num_systems] of this round     */
+  double  *room;     /* [4][num_fields]                               */
+} rm_admission;
+
+remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, const rm_load *load, rm_admission *admission);
+/* got, [givers of the rows][width], is what pack, of the giving cells, has brought: both are scaled. Collective. */
+void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing, double *pack, double *got,
+                      rm_word *word);
 
 /* ---- caas ------------------------------------------------------------------------------------------------------ */
 
@@ -184,19 +331,36 @@ typedef struct rm_integral {
   rm_sum source, minus_target, magnitude;
 } rm_integral;
 
-/* Add x y to a sum unless it is too small to count beside products of ordinary size (below 2^-900). */
+/* Add x y to a sum unless it is too small to count beside products of ordinary size (below 2^-900), or no number. */
 static inline void rm_integral_add(rm_sum *sum, double x, double y)
 {
-  if (fabs(x * y) >= 0x1p-900) rm_sum_add_product(sum, x, y);
+  if (fabs(x * y) >= 0x1p-900 && fabs(x * y) < 0x1p1000) rm_sum_add_product(sum, x, y);
 }
 
 /* Add what the giving cells hold to source and magnitude of integral [num_fields]; flags are left out. Not collective. */
-void rm_integral_source(const rm_transfer_setup *setup, const remap_field_desc *fields, const rm_packing *packing,
-                        const double *given, const double *pack, rm_integral *integral);
+void rm_integral_source(const rm_profile *profile, const rm_packing *packing, rm_integral *integral);
 
 /* Reduce over all ranks and fill in the integrals of reports [num_fields]. Collective. Working memory from scratch. */
 remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_integral *integral,
                                 remap_field_report *reports);
+
+/* ---- gather ---------------------------------------------------------------------------------------------------- */
+
+/* Values of field f in the giving cells, [giving cells][num_fields]. Those that nobody may have count as 0, whatever stands there.
+ * BAD_VALUE. */
+remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given, rm_reason *reason);
+/* Old values, where they are used, [receiving cells][num_fields]. BAD_VALUE. */
+remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason);
+/* Old values of systems, where they are mixed with new ones, to amounts per volume; room is [num_fields]. BAD_VALUE. */
+remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing *packing, double *value, double *room,
+                               rm_reason *reason);
+/* Into the caller's array. */
+void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, int f, const double *value);
+/* Turn vectors into the frame of those who receive. */
+void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, double *given);
+/* What is reconstructed, from what is given; they may be the same array. BAD_VALUE if a density is not positive. */
+remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given, double *number,
+                               const char *which, rm_reason *reason);
 
 /* ---- receive --------------------------------------------------------------------------------------------------- */
 
@@ -208,6 +372,7 @@ struct rm_receipt {
   const rm_packing        *packing;
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
+  double                  *room;     /* [6][num_fields]                                           */
   rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */
 };
 

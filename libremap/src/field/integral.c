@@ -2,47 +2,37 @@
  * same on any number of ranks and shows the error of the transfer, not that of a sum. O(cells + pairs of partial cells). */
 #include "field_private.h"
 
-/* h:S about a centroid that lies e before the point about which the row has its moments. */
-static double curved_part(const rm_rows *rows, int64_t k, const double curvature[7], const double e[3])
-{
-  const double *m = rows->moment[k];
-
-  return rm_dot6(curvature, rows->second[k]) + 2.0 * rm_form(curvature, e, m) +
-         (rm_form(curvature, e, e) + curvature[6]) * rows->volume[k];
-}
-
 /* A partial cell gives what its pairs hold. Its rows have moments about the receiving cells' centroids; they are taken back. */
 static void add_partial(const rm_rows *rows, rm_lid cell, const double centroid[3], double value, const double *slope,
                         const double *curvature, rm_integral *integral)
 {
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const double  volume = rows->volume[k];
-    const double *c      = rows->giver_centroid[rows->giver[k]];
-    const double  e[3]   = {c[0] - centroid[0], c[1] - centroid[1], c[2] - centroid[2]};
+    const double volume = rows->volume[k];
+    double       m[3], second[6];
 
     rm_integral_add(&integral->source, value, volume);
     rm_integral_add(&integral->magnitude, fabs(value), fabs(volume));
-    for (int d = 0; d < 3 && slope; d++)
-      rm_integral_add(&integral->source, slope[d], rows->moment[k][d] + e[d] * volume);
-    if (curvature) rm_integral_add(&integral->source, 1.0, curved_part(rows, k, curvature, e));
+    if (!slope) continue;
+    rm_moments_about(rows, k, centroid, m, second);
+    for (int d = 0; d < 3; d++) rm_integral_add(&integral->source, slope[d], m[d]);
+    if (curvature) rm_integral_add(&integral->source, 1.0, rm_dot6(curvature, second) + curvature[6] * volume);
   }
 }
 
-void rm_integral_source(const rm_transfer_setup *setup, const remap_field_desc *fields, const rm_packing *packing,
-                        const double *given, const double *pack, rm_integral *integral)
+void rm_integral_source(const rm_profile *w, const rm_packing *packing, rm_integral *integral)
 {
-  const rm_rows *rows = setup->giving_rows;
-  const rm_mesh *mesh = setup->giving;
+  const rm_rows *rows = w->ground.rows;
+  const rm_mesh *mesh = w->ground.mesh;
   const int      num  = packing->num_fields;
 
   for (int f = 0; f < num; f++) {
-    if (fields[f].nature == REMAP_FLAG) continue;
+    if (packing->fields[f].nature == REMAP_FLAG) continue;
     for (rm_lid c = 0; c < mesh->num_cells; c++) {
-      const double *place  = pack + (int64_t)c * packing->width + packing->at[f];
-      const double  value  = RM_VALUE_SCALE * given[(int64_t)c * num + f];
-      const double *slope  = packing->order[f] > 1 ? place + RM_PACK_SLOPE : NULL;
-      const double *curvature = packing->order[f] > 2 ? place + rm_pack_curvature(packing->has_bounds) : NULL;
-      const double  volume = mesh->cell_volume[c];
+      const double *place  = w->pack + (int64_t)c * packing->width + packing->at[f];
+      const double  amount = rm_system_amount(packing, f, w->given + (int64_t)c * num, w->number + (int64_t)c * num);
+      const double  value  = RM_VALUE_SCALE * amount, volume = mesh->cell_volume[c];
+      const double *slope  = packing->degree[f] > 0 ? place + RM_PACK_SLOPE : NULL;
+      const double *curvature = packing->degree[f] > 1 ? place + rm_pack_curvature(packing->has_bounds) : NULL;
 
       if (rows->cover[c] == REMAP_COVERED) {
         rm_integral_add(&integral[f].source, value, volume);

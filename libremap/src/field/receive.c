@@ -32,7 +32,7 @@ typedef struct row_sums {
 typedef struct giver_view {
   double        value; /* scaled                                            */
   const double *slope; /* scaled; behind it the bounds, if there are any    */
-  const double *curvature; /* scaled, and its constant; NULL below order 3      */
+  const double *curvature; /* scaled, and its constant; NULL below degree 2     */
 } giver_view;
 
 static giver_view view(const rm_receipt *w, int f, rm_lid giver)
@@ -40,8 +40,8 @@ static giver_view view(const rm_receipt *w, int f, rm_lid giver)
   static const double no_slope[3] = {0.0, 0.0, 0.0};
   const double       *place       = w->got + (int64_t)giver * w->packing->width + w->packing->at[f];
 
-  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->order[f] > 1 ? place + RM_PACK_SLOPE : no_slope,
-                      w->packing->order[f] > 2 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
+  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->degree[f] > 0 ? place + RM_PACK_SLOPE : no_slope,
+                      w->packing->degree[f] > 1 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
 }
 
 static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
@@ -90,50 +90,68 @@ static double mean_beyond(const rm_receipt *w, const giver_view *g, const double
                  rm_dot6(g->curvature, w->setup->receiving_second[cell]) / w->setup->receiving->cell_volume[cell]);
 }
 
-/* The mean over the covered part, each giver's reconstruction taken to the whole cell; under a limiter within the bounds of the
- * givers' neighbourhoods. */
-static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
+/* The mean over the covered part, each giver's reconstruction taken to the whole cell. Not for rows without volume. */
+static double mean_taken_beyond(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
 {
-  const rm_rows *rows  = w->setup->rows;
-  rm_compensated sum   = {0.0, 0.0};
-  double         least = INFINITY, greatest = -INFINITY, mean;
+  const rm_rows *rows = w->setup->rows;
+  rm_compensated sum  = {0.0, 0.0};
 
-  if (is_void(s->volume, s) || is_void(w->setup->receiving->cell_volume[cell], s)) return plain_mean(w, f, cell, s);
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
     const giver_view g = view(w, f, rows->giver[k]);
 
     rm_compensated_add(&sum, mean_beyond(w, &g, rows->giver_centroid[rows->giver[k]], cell) * rows->volume[k]);
-    if (!w->packing->has_bounds || w->packing->order[f] < 2) continue;
-    least    = fmin(least, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE]);
-    greatest = fmax(greatest, g.slope[RM_PACK_BOUNDS - RM_PACK_SLOPE + 1]);
   }
-  mean = rm_compensated_value(&sum) / s->volume;
+  return rm_compensated_value(&sum) / s->volume;
+}
+
+static bool is_void_row(const rm_receipt *w, rm_lid cell, const row_sums *s)
+{
+  return is_void(s->volume, s) || is_void(w->setup->receiving->cell_volume[cell], s);
+}
+
+/* The same under a limiter: within the bounds of the givers' neighbourhoods. */
+static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums *s)
+{
+  const rm_rows *rows  = w->setup->rows;
+  double         least = INFINITY, greatest = -INFINITY, mean;
+
+  if (is_void_row(w, cell, s)) return plain_mean(w, f, cell, s);
+  mean = mean_taken_beyond(w, f, cell, s);
+  if (!w->packing->has_bounds || w->packing->order[f] < 2) return mean;
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    const double *bounds = view(w, f, rows->giver[k]).slope + RM_PACK_BOUNDS - RM_PACK_SLOPE;
+
+    least    = fmin(least, bounds[0]);
+    greatest = fmax(greatest, bounds[1]);
+  }
   return least <= greatest ? fmin(fmax(mean, least), greatest) : mean;
 }
 
-/* The scaled new value of a cell with pairs; its part in the integral goes to integral, if that is not NULL. */
-static double receive_cell(const rm_receipt *w, int f, rm_lid cell, double old, rm_integral *integral)
+/* Is a cell covered in part, and nothing of its old content kept? */
+static bool is_normalised(const rm_receipt *w, int f, rm_lid cell)
 {
-  const row_sums s        = sum_row(w, f, cell);
-  const double   volume   = w->setup->receiving->cell_volume[cell];
-  const bool     is_part  = w->setup->rows->cover[cell] == REMAP_PARTIAL;
-  const bool     is_blend = rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
-  double         value;
+  const uint8_t cover = w->setup->rows->cover[cell];
 
-  if (is_part && !is_blend && w->how->on_partial != REMAP_PARTIAL_CONSERVE) {
-    if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
-    return normalised(w, f, cell, &s);
-  }
+  return cover == REMAP_PARTIAL && !rm_keeps_old(w->how, &w->fields[f], cover) && w->how->on_partial != REMAP_PARTIAL_CONSERVE;
+}
+
+/* The scaled new value of a cell with pairs that is not normalised; its part in the integral goes to integral, if that is not NULL. */
+static double receive_content(const rm_receipt *w, int f, rm_lid cell, double old, const row_sums *s, rm_integral *integral)
+{
+  const double volume   = w->setup->receiving->cell_volume[cell];
+  const bool   is_blend = rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
+  double       value;
+
   old *= RM_VALUE_SCALE;
-  if (is_void(volume, &s))
-    value = is_blend ? old : plain_mean(w, f, cell, &s);
+  if (is_void(volume, s))
+    value = is_blend ? old : plain_mean(w, f, cell, s);
   else
-    value = is_blend ? (s.content + old * (volume - s.volume)) / volume : s.content / volume;
+    value = is_blend ? (s->content + old * (volume - s->volume)) / volume : s->content / volume;
   if (integral) {
     rm_integral_add(&integral->minus_target, -value, volume);
     if (is_blend) {
       rm_integral_add(&integral->minus_target, old, volume);
-      rm_integral_add(&integral->minus_target, -old, s.volume);
+      rm_integral_add(&integral->minus_target, -old, s->volume);
     }
   }
   return value;
@@ -150,31 +168,116 @@ static double receive_flag(const rm_receipt *w, int f, rm_lid cell)
   return w->got[(int64_t)rows->giver[best] * w->packing->width + w->packing->at[f]];
 }
 
-/* The new value of a cell; old is the one it has. */
+static rm_integral *integral_of(const rm_receipt *w, int f) { return w->integral ? &w->integral[f] : NULL; }
+
+/* The new value of a mapped cell outside of systems; old is the one it has. */
 static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
 {
-  const rm_rows          *rows     = w->setup->rows;
-  const remap_field_desc *field    = &w->fields[f];
-  const int64_t           first    = rows->offset[cell];
-  rm_integral            *integral = w->integral ? &w->integral[f] : NULL;
-  double                  copied;
+  const rm_rows *rows     = w->setup->rows;
+  const int64_t  first    = rows->offset[cell];
+  rm_integral   *integral = integral_of(w, f);
+  row_sums       s;
+  double         copied;
 
-  if (rows->cover[cell] == REMAP_UNCOVERED) return rm_keeps_old(w->how, field, REMAP_UNCOVERED) ? old : w->how->fill_value;
-  if (field->nature == REMAP_FLAG) return receive_flag(w, f, cell);
-  if (!rows->same[first]) return receive_cell(w, f, cell, old, integral) / RM_VALUE_SCALE;
+  if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
+  if (!rows->same[first]) {
+    s = sum_row(w, f, cell);
+    if (!is_normalised(w, f, cell)) return receive_content(w, f, cell, old, &s, integral) / RM_VALUE_SCALE;
+    if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
+    return normalised(w, f, cell, &s) / RM_VALUE_SCALE;
+  }
   copied = w->got[(int64_t)rows->giver[first] * w->packing->width + w->packing->at[f]];
   if (integral) rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied, w->setup->receiving->cell_volume[cell]);
   return copied;
 }
 
+/* Amounts of a system, normalised: taken to the whole cell as far as the state can be. value receives them. */
+static void normalise_system(const rm_receipt *w, int system, rm_lid cell, double *value)
+{
+  const rm_packing *p      = w->packing;
+  const rm_rows    *rows   = w->setup->rows;
+  const int         num    = p->num_fields;
+  const rm_limits   limits = {w->room, w->room + num};
+  double           *mean = w->room + 2 * num, *change = w->room + 3 * num, factor = 0.0;
+
+  rm_limits_clear(p, limits);
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1] && p->has_bounds; k++)
+    rm_limits_add(p, w->got + (int64_t)rows->giver[k] * p->width, limits);
+  for (int f = 0; f < num; f++) {
+    row_sums s;
+
+    mean[f] = change[f] = 0.0;
+    if (p->system_of[f] != system) continue;
+    s       = sum_row(w, f, cell);
+    mean[f] = is_void_row(w, cell, &s) ? plain_mean(w, f, cell, &s) : s.content / s.volume;
+    if (p->degree[f] > 0 && !is_void_row(w, cell, &s)) change[f] = mean_taken_beyond(w, f, cell, &s) - mean[f];
+    if (w->integral) rm_integral_add(&w->integral[f].minus_target, -1.0, s.content);
+  }
+  if (p->degree[p->system[system].density] > 0) factor = rm_admit_factor(p, system, mean, change, 1.0, limits, 0x1p-44);
+  for (int f = 0; f < num; f++)
+    if (p->system_of[f] == system) value[f] = (mean[f] + factor * change[f]) / RM_VALUE_SCALE;
+}
+
+/* The new values of a system in a mapped cell: amounts, to be converted; copies are converted for the integrals alone. */
+static void receive_system(const rm_receipt *w, int system, rm_lid cell, double *value)
+{
+  const rm_packing *p     = w->packing;
+  const rm_rows    *rows  = w->setup->rows;
+  const int64_t     first = rows->offset[cell];
+  const double     *given = w->got + (int64_t)rows->giver[first] * p->width;
+  const bool        is_same = rows->same[first] != 0;
+
+  if (!is_same && is_normalised(w, p->system[system].density, cell)) {
+    normalise_system(w, system, cell, value);
+    return;
+  }
+  for (int f = 0; f < p->num_fields; f++) {
+    row_sums s;
+
+    if (p->system_of[f] != system) continue;
+    if (is_same) {
+      value[f] = given[p->at[f]];
+      continue;
+    }
+    s        = sum_row(w, f, cell);
+    value[f] = receive_content(w, f, cell, value[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
+  }
+}
+
+/* Copied values count with their amounts. */
+static void integrate_copies(const rm_receipt *w, rm_lid cell, const double *value)
+{
+  double *number = w->room;
+  int     bad;
+
+  if (!w->integral || !rm_system_numbers(w->packing, value, number, &bad)) return;
+  for (int f = 0; f < w->packing->num_fields; f++)
+    if (w->packing->system_of[f] >= 0)
+      rm_integral_add(&w->integral[f].minus_target, -RM_VALUE_SCALE * rm_system_amount(w->packing, f, value, number),
+                      w->setup->receiving->cell_volume[cell]);
+}
+
 void rm_receive(const rm_receipt *w)
 {
-  const int num = w->packing->num_fields;
+  const rm_rows *rows = w->setup->rows;
+  const int      num  = w->packing->num_fields;
 
-  for (rm_lid c = 0; c < w->setup->receiving->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
+  for (rm_lid c = 0; c < rows->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
     double *value = w->value + (int64_t)c * num;
 
-    if (w->setup->rows->cover[c] == REMAP_UNWANTED) continue;
-    for (int f = 0; f < num; f++) value[f] = receive(w, f, c, value[f]);
+    if (rows->cover[c] == REMAP_UNWANTED) continue;
+    for (int f = 0; f < num; f++) {
+      if (rows->cover[c] == REMAP_UNCOVERED)
+        value[f] = rm_keeps_old(w->how, &w->fields[f], REMAP_UNCOVERED) ? value[f] : w->how->fill_value;
+      else if (w->packing->system_of[f] < 0)
+        value[f] = receive(w, f, c, value[f]);
+    }
+    if (rows->cover[c] == REMAP_UNCOVERED) continue;
+    for (int s = 0; s < w->packing->num_systems; s++) receive_system(w, s, c, value);
+    if (w->packing->num_systems == 0) continue;
+    if (rows->same[rows->offset[c]])
+      integrate_copies(w, c, value);
+    else
+      rm_system_restore(w->packing, value);
   }
 }

@@ -90,36 +90,108 @@ static void widen_bounds(double bounds[2])
   bounds[1] = bounds[1] <= 0.0 ? fmin(bounds[1] + range, 0.0) : bounds[1] + range;
 }
 
-/* What became of a cell's reconstruction. */
-enum { IS_LIMITED = 1, IS_REDUCED = 2 };
+/* The reconstruction of one field in one cell, before it is limited. */
+typedef struct fit {
+  double linear[3], slope[3], curvature[7], bounds[2]; /* bounds: those that the limiter keeps */
+  double local[2];                                     /* those of the neighbours alone        */
+  double factor;                                       /* that the linear slope is limited by  */
+  bool   is_quadratic, is_reduced, is_limited;
+} fit;
 
-/* Reconstruction and bounds of one field in one cell, into its place in the pack. */
-static int reconstruct_cell(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, const rm_around *u, int order,
-                            const rm_packing *packing, bool is_smooth, double *place)
+/* Bounds of an amount per mass: smooth fields may leave the neighbours', but not those of the whole mesh. */
+static void widen_within(double bounds[2], const double extreme[2])
 {
-  const double value = rm_value_at(u, mesh->num_cells, cell);
-  double      *slope = place + RM_PACK_SLOPE, *curvature = place + rm_pack_curvature(packing->has_bounds);
-  double       linear[3], bounds[2], factor;
-  int          what = 0;
+  const double range = bounds[1] - bounds[0];
 
-  rm_fit_slope(stencil, cell, u, linear, bounds);
-  for (int d = 0; d < 3; d++) slope[d] = linear[d];
-  if (is_smooth) widen_bounds(bounds);
-  if (packing->has_bounds)
-    for (int b = 0; b < 2; b++) place[RM_PACK_BOUNDS + b] = bounds[b];
-  if (order > 2) {
-    if (!rm_fit_quadratic(stencil, cell, u, slope, curvature))
-      what |= IS_REDUCED;
-    else if (!packing->is_limited || keeps_within(stencil, mesh, cell, value, slope, curvature, bounds[0], bounds[1]))
-      return what;
-    else
-      what |= IS_LIMITED;
-    for (int k = 0; k < 7; k++) curvature[k] = 0.0;
+  bounds[0] = fmax(bounds[0] - range, fmin(bounds[0], RM_VALUE_SCALE * extreme[0]));
+  bounds[1] = fmin(bounds[1] + range, fmax(bounds[1], RM_VALUE_SCALE * extreme[1]));
+}
+
+/* Has a field bounds of its own whatever its sign: what moves with the mass, but for energy? */
+static bool is_carried(const rm_packing *packing, int f)
+{
+  const rm_system *s = packing->system_of[f] >= 0 ? &packing->system[packing->system_of[f]] : NULL;
+
+  return s && f != s->density && f != s->energy;
+}
+
+static void fit_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, int f, bool is_smooth, fit *out)
+{
+  const rm_stencil *stencil = w->ground.stencil;
+  const rm_mesh    *mesh    = w->ground.mesh;
+  const rm_around   u       = rm_around_of((rm_numbers){w->number, rm_flow_numbers(&w->halo)}, f, packing->num_fields);
+  const double      value   = rm_value_at(&u, mesh->num_cells, cell);
+  const double      extreme[2] = {w->extreme[f], w->extreme[packing->num_fields + f]};
+
+  *out = (fit){.factor = 1.0};
+  rm_fit_slope(stencil, cell, &u, out->linear, out->bounds);
+  for (int b = 0; b < 2; b++) out->local[b] = out->bounds[b];
+  if (is_carried(packing, f) && (is_smooth || !packing->is_limited))
+    widen_within(out->bounds, extreme);
+  else if (is_smooth)
+    widen_bounds(out->bounds);
+  for (int d = 0; d < 3; d++) out->slope[d] = out->linear[d];
+  if (packing->order[f] > 2) {
+    out->is_quadratic = rm_fit_quadratic(stencil, cell, &u, out->slope, out->curvature);
+    out->is_reduced   = !out->is_quadratic;
+    if (out->is_quadratic && packing->is_limited &&
+        !keeps_within(stencil, mesh, cell, value, out->slope, out->curvature, out->bounds[0], out->bounds[1])) {
+      out->is_quadratic = false;
+      out->is_limited   = true;
+    }
   }
-  if (!packing->is_limited) return what;
-  factor = barth_jespersen(stencil, mesh, cell, value, linear, bounds[0], bounds[1]);
-  for (int d = 0; d < 3; d++) slope[d] = factor * linear[d];
-  return what | (factor < 1.0 ? IS_LIMITED : 0);
+  if (!packing->is_limited) return;
+  out->factor = barth_jespersen(stencil, mesh, cell, value, out->linear, out->bounds[0], out->bounds[1]);
+  out->is_limited |= !out->is_quadratic && out->factor < 1.0;
+}
+
+/* A fit into the pack: quadratic, or its linear slope times a factor. */
+static void put_fit(const rm_packing *packing, int f, const fit *x, bool is_quadratic, double factor, double *place)
+{
+  double *slope = place + RM_PACK_SLOPE, *curvature = place + rm_pack_curvature(packing->has_bounds);
+
+  for (int d = 0; d < 3; d++) slope[d] = is_quadratic ? x->slope[d] : factor * x->linear[d];
+  for (int b = 0; b < 2 && packing->has_bounds; b++)
+    place[RM_PACK_BOUNDS + b] = packing->system_of[f] < 0 || is_carried(packing, f) ? x->bounds[b] : x->local[b];
+  for (int k = 0; k < 7 && packing->degree[f] > 1; k++) curvature[k] = is_quadratic ? x->curvature[k] : 0.0;
+}
+
+/* Mass fractions of a system. */
+static bool is_fraction(const rm_packing *packing, int f)
+{
+  return packing->system_of[f] >= 0 && packing->fields[f].role == REMAP_ROLE_MASS_FRACTION;
+}
+
+static bool is_smooth_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, int f)
+{
+  const rm_around rough = rm_around_of((rm_numbers){w->spread, rm_flow_numbers(&w->roughs)}, f, packing->num_fields);
+
+  return packing->is_checked && rm_is_smooth(w->ground.stencil, cell, &rough);
+}
+
+/* The mass fractions of a system keep their sum: they are limited alike. */
+static void reconstruct_fractions(const rm_profile *w, const rm_packing *packing, rm_lid cell, int s, double *place)
+{
+  const int num = packing->num_fields;
+  bool      is_smooth = true, is_quadratic = true;
+  double    factor = 1.0;
+  fit       x;
+
+  for (int f = 0; f < num; f++)
+    if (is_fraction(packing, f) && packing->system_of[f] == s) is_smooth = is_smooth && is_smooth_cell(w, packing, cell, f);
+  for (int f = 0; f < num; f++) {
+    if (!is_fraction(packing, f) || packing->system_of[f] != s) continue;
+    fit_cell(w, packing, cell, f, is_smooth, &x);
+    is_quadratic = is_quadratic && x.is_quadratic;
+    factor       = fmin(factor, x.factor);
+  }
+  for (int f = 0; f < num; f++) {
+    if (!is_fraction(packing, f) || packing->system_of[f] != s) continue;
+    fit_cell(w, packing, cell, f, is_smooth, &x);
+    put_fit(packing, f, &x, is_quadratic, factor, place + packing->at[f]);
+    w->limited[f] += packing->is_limited && (packing->order[f] > 2 ? !is_quadratic && !x.is_reduced : factor < 1.0);
+    w->limited[num + f] += x.is_reduced;
+  }
 }
 
 /* The mean belongs to the true centroid; what travels is the value at the rounded one, about which the moments are. */
@@ -131,32 +203,47 @@ static void move_to_rounded_centroid(const double error[3], double *place)
   if (rise < 0.0 || rise > 0.0) place[0] = (RM_VALUE_SCALE * place[0] - rise) / RM_VALUE_SCALE;
 }
 
-void rm_reconstruct(const rm_transfer_setup *setup, const rm_packing *packing, rm_numbers given, rm_numbers rough,
-                    const uint8_t *needs_halo, uint8_t which, double *pack, int64_t *limited, int64_t *reduced)
+/* Polynomials of all fields in one cell, as they are reconstructed. */
+static void reconstruct_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, double *place)
 {
-  const rm_mesh *mesh = setup->giving;
+  const int num = packing->num_fields;
+
+  for (int f = 0; f < num; f++) {
+    fit x;
+
+    if (packing->order[f] < 2 || is_fraction(packing, f)) continue;
+    fit_cell(w, packing, cell, f, is_smooth_cell(w, packing, cell, f), &x);
+    put_fit(packing, f, &x, x.is_quadratic, x.factor, place + packing->at[f]);
+    w->limited[f] += x.is_limited;
+    w->limited[num + f] += x.is_reduced;
+    if (packing->system_of[f] < 0) move_to_rounded_centroid(w->ground.rows->centroid_error[cell], place + packing->at[f]);
+  }
+  for (int s = 0; s < packing->num_systems; s++) {
+    const int at = packing->system[s].density;
+
+    if (packing->order[at] < 2) continue;
+    reconstruct_fractions(w, packing, cell, s, place);
+    rm_system_combine(packing, s, w->given + (int64_t)cell * num, w->number + (int64_t)cell * num, w->ground.second[cell],
+                      w->ground.mesh->cell_volume[cell], w->ground.rows->centroid_error[cell], place);
+  }
+}
+
+void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t which)
+{
+  const rm_rows *rows = w->ground.rows;
   const int      num  = packing->num_fields;
 
-  for (rm_lid c = 0; c < mesh->num_cells; c++) { /* cells first: their weights are read once for all fields */
-    if (needs_halo[c] != which) continue;
+  for (rm_lid c = 0; c < w->ground.mesh->num_cells; c++) { /* cells first: their weights are read once for all fields */
+    const double *given = w->given + (int64_t)c * num, *number = w->number + (int64_t)c * num;
+    double       *place = w->pack + (int64_t)c * packing->width;
+    const bool    is_mapped = rm_is_mapped(rows->cover[c]), is_same = is_mapped && rows->same[rows->offset[c]];
+
+    if (w->needs_halo[c] != which) continue;
     for (int f = 0; f < num; f++) {
-      const rm_around u     = rm_around_of(given, f, num);
-      const int       order = packing->order[f];
-      double         *place = pack + (int64_t)c * packing->width + packing->at[f];
-
-      place[0] = given.own[(int64_t)c * num + f];
-      if (order < 2) continue;
-      if (rm_is_mapped(setup->giving_rows->cover[c])) {
-        const rm_around r         = rm_around_of(rough, f, num);
-        const bool      is_smooth = packing->is_checked && rm_is_smooth(setup->giving_stencil, c, &r);
-        const int       what      = reconstruct_cell(setup->giving_stencil, mesh, c, &u, order, packing, is_smooth, place);
-
-        limited[f] += (what & IS_LIMITED) != 0;
-        reduced[f] += (what & IS_REDUCED) != 0;
-        move_to_rounded_centroid(setup->giving_rows->centroid_error[c], place);
-        continue;
-      }
-      for (int k = RM_PACK_SLOPE; k < rm_pack_width(order, packing->has_bounds); k++) place[k] = 0.0; /* nobody asks for it */
+      place[packing->at[f]] = is_same ? given[f] : rm_system_amount(packing, f, given, number);
+      for (int k = RM_PACK_SLOPE; k < rm_pack_width(packing->degree[f], packing->has_bounds) && !is_mapped; k++)
+        place[packing->at[f] + k] = 0.0; /* nobody asks for it */
     }
+    if (is_mapped) reconstruct_cell(w, packing, c, place);
   }
 }

@@ -1,0 +1,189 @@
+/* gather -- values between the caller's arrays, strided and block by block, and those of a transfer, cell after cell; vectors are
+ * turned and systems converted on the way. O(cells) per field. */
+#include "field_private.h"
+
+#include <stdio.h>
+
+/* The values of one block of one field: of cells first to end - 1, that of cell i at array + stride * (place[i] or i - zero). */
+typedef struct strip {
+  const rm_layout *layout;
+  rm_lid           first, end, zero;
+  int64_t          stride;
+} strip;
+
+static int num_strips(const rm_layout *layout) { return layout->num_blocks > 0 ? layout->num_blocks : 1; }
+
+static strip strip_of(const rm_layout *layout, rm_lid num_cells, int block, bool is_by_block, int64_t stride)
+{
+  strip s = {layout, 0, num_cells, 0, stride ? stride : 1};
+
+  if (layout->num_blocks > 0) {
+    s.first = layout->block_offset[block];
+    s.end   = layout->block_offset[block + 1];
+  }
+  if (is_by_block) s.zero = s.first;
+  return s;
+}
+
+static int64_t place_of(const strip *s, rm_lid cell)
+{
+  return (s->layout->place ? s->layout->place[cell] : cell - s->zero) * s->stride;
+}
+
+/* A field's name for messages. */
+typedef struct label {
+  char text[64];
+} label;
+
+static label label_of(const rm_packing *packing, int f)
+{
+  label l;
+
+  if (packing->fields[f].name)
+    snprintf(l.text, sizeof l.text, "%s", packing->fields[f].name);
+  else
+    snprintf(l.text, sizeof l.text, "number %d", f);
+  return l;
+}
+
+static remap_status bad_value(const rm_packing *packing, int f, const rm_mesh *mesh, rm_lid cell, double value, const char *which,
+                              rm_reason *reason)
+{
+  return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[cell], "field %s: %s value %g is not a finite number",
+                 label_of(packing, f).text, which, value);
+}
+
+remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given, rm_reason *reason)
+{
+  const rm_mesh          *mesh   = setup->giving;
+  const remap_field_desc *field  = &packing->fields[f];
+  const rm_layout        *layout = &setup->giving_layout;
+
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip   s  = strip_of(layout, mesh->num_cells, b, field->in_block != NULL, field->in_stride);
+    const double *in = field->in_block ? field->in_block[b] : field->in;
+
+    for (rm_lid i = s.first; i < s.end; i++) {
+      const double value = setup->giving_rows->cover[i] != REMAP_UNWANTED ? in[place_of(&s, i)] : 0.0;
+
+      if (!isfinite(value) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, value, "the", reason);
+      given[(int64_t)i * packing->num_fields + f] = value;
+    }
+  }
+  return REMAP_OK;
+}
+
+/* Where the values of a block's receiving cells go. */
+static double *out_of(const remap_field_desc *field, int block) { return field->out_block ? field->out_block[block] : field->out; }
+
+remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason)
+{
+  const rm_mesh          *mesh   = setup->receiving;
+  const remap_field_desc *field  = &packing->fields[f];
+  const rm_layout        *layout = &setup->receiving_layout;
+
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip   s   = strip_of(layout, mesh->num_cells, b, field->out_block != NULL, field->out_stride);
+    const double *out = out_of(field, b);
+
+    for (rm_lid i = s.first; i < s.end; i++) {
+      const double old = rm_keeps_old(packing->how, field, setup->rows->cover[i]) ? out[place_of(&s, i)] : 0.0;
+
+      if (!isfinite(old) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, old, "the old", reason);
+      value[(int64_t)i * packing->num_fields + f] = old;
+    }
+  }
+  return REMAP_OK;
+}
+
+void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, int f, const double *value)
+{
+  const remap_field_desc *field  = &packing->fields[f];
+  const rm_layout        *layout = &setup->receiving_layout;
+
+  for (int b = 0; b < num_strips(layout); b++) {
+    const strip s   = strip_of(layout, setup->receiving->num_cells, b, field->out_block != NULL, field->out_stride);
+    double     *out = out_of(field, b);
+
+    for (rm_lid i = s.first; i < s.end; i++)
+      if (setup->rows->cover[i] != REMAP_UNWANTED) out[place_of(&s, i)] = value[(int64_t)i * packing->num_fields + f];
+  }
+}
+
+/* Turn the vector with these components in all cells; backward the other way. */
+static void turn_vector(const rm_transfer_setup *setup, const rm_packing *packing, const int component[3], double *given)
+{
+  const double *m         = packing->how->rotation;
+  const bool    is_source = setup->giving->side == REMAP_SOURCE;
+
+  for (rm_lid c = 0; c < setup->giving->num_cells; c++) {
+    double *v = given + (int64_t)c * packing->num_fields, turned[3];
+
+    for (int r = 0; r < 3; r++) {
+      turned[r] = 0.0;
+      for (int k = 0; k < 3; k++) turned[r] += m[is_source ? 3 * r + k : 3 * k + r] * v[component[k]];
+    }
+    for (int r = 0; r < 3; r++) v[component[r]] = turned[r];
+  }
+}
+
+void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, double *given)
+{
+  if (!packing->how->rotation) return;
+  for (int s = 0; s < packing->num_systems; s++)
+    if (packing->system[s].motion[0] >= 0) turn_vector(setup, packing, packing->system[s].motion, given);
+  for (int f = 0; f < packing->num_fields; f++) {
+    int component[3] = {f, -1, -1}, num = 1;
+
+    for (int k = f + 1; k < packing->num_fields && num < 3; k++)
+      if (packing->fields[f].vector > 0 && packing->fields[k].vector == packing->fields[f].vector) component[num++] = k;
+    if (num == 3) turn_vector(setup, packing, component, given); /* only its first component has two more behind it */
+  }
+}
+
+remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given, double *number,
+                               const char *which, rm_reason *reason)
+{
+  for (rm_lid c = 0; c < mesh->num_cells; c++) {
+    const int64_t at  = (int64_t)c * packing->num_fields;
+    int           bad = -1;
+
+    if (rows->cover[c] == REMAP_UNWANTED) {
+      for (int f = 0; f < packing->num_fields; f++) number[at + f] = given[at + f];
+      continue;
+    }
+    if (!rm_system_numbers(packing, given + at, number + at, &bad))
+      return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[c], "field %s: %s density %g is not above 0",
+                     label_of(packing, bad).text, which, given[at + bad]);
+  }
+  return REMAP_OK;
+}
+
+remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing *packing, double *value, double *room,
+                               rm_reason *reason)
+{
+  const rm_mesh *mesh = setup->receiving;
+  const int      num  = packing->num_fields;
+
+  for (rm_lid c = 0; c < mesh->num_cells; c++) {
+    double *old   = value + (int64_t)c * num;
+    bool    mixes = false;
+    int     bad   = -1;
+
+    if (setup->rows->cover[c] != REMAP_PARTIAL) continue;
+    for (int s = 0; s < packing->num_systems; s++) {
+      const int density = packing->system[s].density;
+
+      if (rm_keeps_old(packing->how, &packing->fields[density], REMAP_PARTIAL))
+        mixes = true;
+      else
+        old[density] = 1.0; /* nobody reads it */
+    }
+    if (!mixes) continue;
+    if (!rm_system_numbers(packing, old, room, &bad))
+      return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[c], "field %s: the old density %g is not above 0",
+                     label_of(packing, bad).text, old[bad]);
+    for (int f = 0; f < num; f++) old[f] = rm_system_amount(packing, f, old, room); /* those per mass do not read what is done */
+  }
+  return REMAP_OK;
+}

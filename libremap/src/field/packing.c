@@ -1,0 +1,84 @@
+/* packing -- how much a transfer moves, and where in what travels each number stands. O(fields). */
+#include "field_private.h"
+
+bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
+{
+  bool normalises = false, has_system = false;
+
+  for (int f = 0; f < num_fields; f++) {
+    if (!rm_has_slope(how, &fields[f])) continue;
+    has_system |= fields[f].system > 0;
+    normalises |= how->on_partial == REMAP_PARTIAL_NORMALISE || (how->on_partial == REMAP_PARTIAL_BLEND && !fields[f].has_old);
+  }
+  return has_system || how->limiter == REMAP_LIMITER_CAAS ||
+         (normalises && how->limiter != REMAP_LIMITER_NONE && setup->any_partial);
+}
+
+/* Is a field the first of its system? */
+static bool is_first(const remap_field_desc *fields, int f)
+{
+  for (int k = 0; k < f; k++)
+    if (fields[k].system == fields[f].system) return false;
+  return fields[f].system > 0;
+}
+
+rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
+{
+  const bool has_bounds = rm_needs_bounds(setup, how, num_fields, fields);
+  rm_load    load       = {.num_fields = num_fields};
+
+  for (int f = 0; f < num_fields; f++) {
+    const bool is_sloped = rm_has_slope(how, &fields[f]);
+
+    load.width += rm_pack_width(rm_degree(how, &fields[f]), has_bounds);
+    load.num_systems += is_first(fields, f);
+    load.has_slopes |= is_sloped;
+    load.is_wide |= is_sloped && how->order > 2;
+    load.is_curved |= is_sloped && fields[f].system > 0;
+    load.is_settled |= is_sloped && how->limiter == REMAP_LIMITER_CAAS;
+    load.is_checked |= is_sloped && how->limiter == REMAP_LIMITER_AUTO;
+    load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
+  }
+  return load;
+}
+
+static int greater(int a, int b) { return a > b ? a : b; }
+
+rm_load rm_load_max(rm_load a, rm_load b)
+{
+  return (rm_load){.num_fields  = greater(a.num_fields, b.num_fields),
+                   .width       = greater(a.width, b.width),
+                   .num_systems = greater(a.num_systems, b.num_systems),
+                   .has_slopes  = a.has_slopes || b.has_slopes,
+                   .is_settled  = a.is_settled || b.is_settled,
+                   .is_checked  = a.is_checked || b.is_checked,
+                   .is_wide     = a.is_wide || b.is_wide,
+                   .is_curved   = a.is_curved || b.is_curved,
+                   .has_nearest = a.has_nearest || b.has_nearest};
+}
+
+bool rm_load_covers(rm_load a, rm_load b)
+{
+  return a.num_fields >= b.num_fields && a.width >= b.width && a.num_systems >= b.num_systems && a.has_slopes >= b.has_slopes &&
+         a.is_settled >= b.is_settled && a.is_checked >= b.is_checked && a.is_wide >= b.is_wide && a.is_curved >= b.is_curved &&
+         a.has_nearest >= b.has_nearest;
+}
+
+void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
+                     const remap_field_desc *fields)
+{
+  p->how        = how;
+  p->fields     = fields;
+  p->num_fields = num_fields;
+  p->is_limited = how->limiter == REMAP_LIMITER_BARTH_JESPERSEN || how->limiter == REMAP_LIMITER_AUTO;
+  p->is_checked = how->limiter == REMAP_LIMITER_AUTO;
+  p->has_bounds = rm_needs_bounds(setup, how, num_fields, fields);
+  p->width      = 0;
+  for (int f = 0; f < num_fields; f++) {
+    p->order[f]  = rm_has_slope(how, &fields[f]) ? how->order : 1;
+    p->degree[f] = rm_degree(how, &fields[f]);
+    p->at[f]     = p->width;
+    p->width += rm_pack_width(p->degree[f], p->has_bounds);
+  }
+  rm_systems_find(p);
+}

@@ -1,0 +1,141 @@
+/* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the limiter
+ * auto slopes, then which cells are rough, twice; with systems a reduction over all ranks. O(neighbours) per cell and field; 16 to
+ * 56 bytes per cell and field, 40 more for auto, 56 more for polynomials of degree 2. */
+#include "field_private.h"
+
+void rm_word_add(rm_word *word, remap_status status)
+{
+  if (status > word->mine) word->mine = status;
+  if ((int64_t)status > word->note.status) word->note.status = status;
+}
+
+void rm_word_await(rm_word *word, const rm_comm *comm, rm_flow *flow)
+{
+  const remap_status waited = rm_flow_wait(comm, flow, &word->note);
+
+  if (waited == REMAP_BAD_ARGUMENT)
+    rm_fail(waited, &word->reason, -1, -1,
+            "direction, transfer, number, natures or old values of fields differ from those of a neighbouring rank");
+  rm_word_add(word, waited);
+}
+
+bool rm_word_agree(rm_word *word, const rm_comm *comm)
+{
+  word->note.status = (int64_t)rm_comm_agree(comm, (remap_status)word->note.status, NULL);
+  return word->note.status == REMAP_OK;
+}
+
+static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
+{
+  for (rm_lid c = 0; c < stencil->num_cells; c++) {
+    for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++)
+      needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
+    for (int64_t k = stencil->wide_offset ? stencil->wide_offset[c] : 0; stencil->wide_offset && k < stencil->wide_offset[c + 1]; k++)
+      needs_halo[c] |= stencil->wide_neighbour[k] >= stencil->num_cells;
+  }
+}
+
+remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *p)
+{
+  const rm_lid  cells = p->ground.mesh->num_cells;
+  const int     n     = load->num_fields;
+  const size_t  bytes = (size_t)n * sizeof(double);
+  const rm_plan *plan = load->has_slopes ? p->ground.stencil->plan : NULL;
+
+  RM_NEW0(p->needs_halo, arena, cells);
+  RM_NEW(p->pack, arena, rm_mul_sat(cells, load->width));
+  RM_NEW(p->limited, arena, 2 * (int64_t)n);
+  RM_NEW0(p->extreme, arena, 2 * (int64_t)n);
+  if (load->has_slopes) {
+    RM_TRY(rm_flow_init(arena, plan, bytes, &p->halo));
+    mark_halo_cells(p->ground.stencil, p->needs_halo);
+  }
+  if (!load->is_checked) return REMAP_OK;
+  RM_TRY(rm_flow_init(arena, plan, 3 * bytes, &p->slopes));
+  RM_TRY(rm_flow_init(arena, plan, bytes, &p->roughs));
+  RM_NEW(p->slope, arena, rm_mul_sat(cells, n));
+  RM_NEW(p->rough, arena, rm_mul_sat(cells, n));
+  RM_NEW(p->spread, arena, rm_mul_sat(cells, n));
+  return REMAP_OK;
+}
+
+bool rm_profile_reads_halo(const rm_packing *packing)
+{
+  bool reads = false;
+
+  for (int f = 0; f < packing->num_fields; f++) reads |= packing->order[f] > 1;
+  return reads;
+}
+
+void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
+{
+  const size_t bytes = (size_t)packing->num_fields * sizeof(double);
+
+  for (int f = 0; f < 2 * packing->num_fields; f++) p->limited[f] = 0;
+  if (rm_profile_reads_halo(packing)) {
+    rm_word_add(word, rm_flow_post(comm, &p->halo, bytes, p->number, word->note));
+  } else if (word->note.status == REMAP_OK) {
+    rm_reconstruct(p, packing, 0);
+    rm_reconstruct(p, packing, 1);
+  }
+}
+
+/* Tell smooth cells from others: slopes of all around, then roughness of all around, and of all around them. */
+static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
+{
+  const rm_stencil *stencil = p->ground.stencil;
+  const size_t      bytes   = (size_t)packing->num_fields * sizeof(double);
+  const rm_numbers  numbers = {p->number, rm_flow_numbers(&p->halo)};
+
+  if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope);
+  rm_word_add(word, rm_flow_post(comm, &p->slopes, 3 * bytes, p->slope, word->note));
+  rm_word_await(word, comm, &p->slopes);
+  if (word->note.status == REMAP_OK)
+    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[3])p->slope,
+                        (const double(*)[3])(const void *)p->slopes.received, p->rough);
+  rm_word_add(word, rm_flow_post(comm, &p->roughs, bytes, p->rough, word->note));
+  rm_word_await(word, comm, &p->roughs);
+  if (word->note.status == REMAP_OK)
+    rm_smooth_spread(stencil, packing, (rm_numbers){p->rough, rm_flow_numbers(&p->roughs)}, p->spread);
+  rm_word_add(word, rm_flow_post(comm, &p->roughs, bytes, p->spread, word->note));
+  rm_word_await(word, comm, &p->roughs);
+}
+
+/* The least and the greatest number of every field anywhere. Collective. */
+static void find_extremes(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
+{
+  const int num = packing->num_fields;
+
+  for (int f = 0; f < 2 * num; f++) p->extreme[f] = -INFINITY; /* of negative numbers, then of numbers */
+  for (rm_lid c = 0; c < p->ground.mesh->num_cells; c++)
+    for (int f = 0; f < num; f++) {
+      const double x = p->number[(int64_t)c * num + f];
+
+      if (p->ground.rows->cover[c] == REMAP_UNWANTED || !isfinite(x)) continue;
+      p->extreme[f]       = fmax(p->extreme[f], -x);
+      p->extreme[num + f] = fmax(p->extreme[num + f], x);
+    }
+  if (!rm_word_agree(word, comm)) return;
+  rm_word_add(word, rm_comm_max_f64(comm, p->extreme, 2 * num));
+  for (int f = 0; f < num; f++) p->extreme[f] = -p->extreme[f];
+}
+
+void rm_profile_finish(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
+{
+  const bool waits = packing->is_checked || packing->num_systems > 0; /* no cell is ready before its neighbours are looked at */
+
+  if (!rm_profile_reads_halo(packing)) return;
+  if (word->note.status == REMAP_OK && !waits) rm_reconstruct(p, packing, 0);
+  rm_word_await(word, comm, &p->halo);
+  if (packing->is_checked) find_smooth(p, comm, packing, word);
+  if (packing->num_systems > 0) find_extremes(p, comm, packing, word);
+  if (word->note.status == REMAP_OK && waits) rm_reconstruct(p, packing, 0);
+  if (word->note.status == REMAP_OK) rm_reconstruct(p, packing, 1);
+}
+
+void rm_profile_abandon(rm_profile *p, const rm_comm *comm, rm_word *word)
+{
+  if (p->halo.num_requests > 0) (void)rm_flow_wait(comm, &p->halo, &word->note);
+  if (p->slopes.num_requests > 0) (void)rm_flow_wait(comm, &p->slopes, &word->note);
+  if (p->roughs.num_requests > 0) (void)rm_flow_wait(comm, &p->roughs, &word->note);
+}
