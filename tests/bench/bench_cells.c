@@ -4,7 +4,7 @@
  *
  *   bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]]      room cells alone
  *   bench_cells all N NB SCALE diagonal|centre [ANGLE [PHASE]]             remap_supermesh, from the meshes as lent, union
- *   bench_cells all spheres LEVEL [OFFSET]                                 the same of two closed surfaces
+ *   bench_cells all spheres LEVEL [OFFSET]                                 the same of two closed surfaces, intersection
  *   bench_cells spheres LEVEL OFFSET [REPEATS]    two closed surfaces of 20 4^LEVEL triangles each, one moved by OFFSET radii
  *   bench_cells cut LEVEL [REPEATS]               one such surface in a grid of 32 x 40 x 23 boxes */
 #include <mpi.h>
@@ -140,9 +140,9 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
 }
 
 /* remap_supermesh on all ranks; the meshes are dealt in slabs. */
-static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces)
+static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int keep)
 {
-  static const remap_supermesh_options all = {.keep = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET, .pass_through = 1};
+  const remap_supermesh_options all = {.keep = keep, .pass_through = 1};
   tm_mesh             *whole[2] = {source, target}, *mine[2];
   remap_context       *ctx;
   remap_options        how;
@@ -177,10 +177,11 @@ int main(int argc, char **argv)
   if (argc > 3 && !strcmp(argv[1], "all")) {
     const bool spheres = !strcmp(argv[2], "spheres");
     MPI_Init(&argc, &argv);
-    if (spheres) run_all(sphere(atoi(argv[3]), 0), sphere(atoi(argv[3]), argc > 4 ? atof(argv[4]) : .1), REMAP_FACES_DIAGONAL);
+    if (spheres) run_all(sphere(atoi(argv[3]), 0), sphere(atoi(argv[3]), argc > 4 ? atof(argv[4]) : .1), REMAP_FACES_DIAGONAL, REMAP_IN_BOTH);
     else if (argc > 5)
       run_all(tm_benchmark(atoi(argv[2]), argc > 7 ? atof(argv[7]) : 0.7, argc > 6 ? atof(argv[6]) : 0.3, atof(argv[4])),
-              tm_benchmark(atoi(argv[3]), 0.1, 0, 1), strcmp(argv[5], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE);
+              tm_benchmark(atoi(argv[3]), 0.1, 0, 1), strcmp(argv[5], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE,
+              REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET);
     MPI_Finalize();
     return 0;
   }

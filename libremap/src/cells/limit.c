@@ -22,7 +22,7 @@ typedef struct builder {
   rm_limit      *l;
   rm_reason     *reason;
   const rm_boxtree *tree[2];      /* [side] over all triangles, NULL until needed */
-  double       (*box[2])[6];
+  const double (*box[2])[6];
   uint8_t       *edge_present[2]; /* [side][num_edges] some present triangle has the edge */
   rm_feature    *at[2];           /* [side][num_vertices] where the vertex lies in the other mesh */
   edge_contact  *contact;         /* ascending by edge[0] */
@@ -97,15 +97,22 @@ enum { LARGE = 256 };
 static remap_status need_tree(builder *b, int side)
 {
   const rm_trimesh *m = b->l->o->mesh[side];
+  double          (*box)[6];
 
   if (b->tree[side]) return REMAP_OK;
-  RM_NEW(b->box[side], b->scratch, m->num_triangles);
+  if (m->num_skin == m->num_triangles) { /* a closed surface: all is skin, in the same order */
+    b->tree[side] = m->skin_tree;
+    b->box[side]  = m->skin_box;
+    return REMAP_OK;
+  }
+  RM_NEW(box, b->scratch, m->num_triangles);
   for (rm_lid t = 0; t < m->num_triangles; t++)
     for (int c = 0; c < 3; c++) {
-      b->box[side][t][c]     = fmin(corner(m, t, 0)[c], fmin(corner(m, t, 1)[c], corner(m, t, 2)[c]));
-      b->box[side][t][c + 3] = fmax(corner(m, t, 0)[c], fmax(corner(m, t, 1)[c], corner(m, t, 2)[c]));
+      box[t][c]     = fmin(corner(m, t, 0)[c], fmin(corner(m, t, 1)[c], corner(m, t, 2)[c]));
+      box[t][c + 3] = fmax(corner(m, t, 0)[c], fmax(corner(m, t, 1)[c], corner(m, t, 2)[c]));
     }
-  return rm_boxtree_build(b->scratch, m->num_triangles, (const double (*)[6])b->box[side], &b->tree[side]);
+  b->box[side] = (const double (*)[6])box;
+  return rm_boxtree_build(b->scratch, m->num_triangles, b->box[side], &b->tree[side]);
 }
 
 typedef struct vertex_query {
@@ -180,7 +187,7 @@ static remap_status place_vertices(builder *b, int side)
       rm_boxtree_query(other->skin_tree, other->skin_box, at, touch_skin, &q);
     } else if (j < RM_OUTSIDE || other->cell_triangle_offset[j + 1] - other->cell_triangle_offset[j] > LARGE) {
       RM_TRY(need_tree(b, 1 - side));
-      rm_boxtree_query(b->tree[1 - side], (const double (*)[6])b->box[1 - side], at, touch_triangle, &q);
+      rm_boxtree_query(b->tree[1 - side], b->box[1 - side], at, touch_triangle, &q);
     } else {
       for (rm_lid k = other->cell_triangle_offset[j]; k < other->cell_triangle_offset[j + 1]; k++)
         if (touch_triangle(&q, b->l->first_copy[1 - side][other->cell_triangle[k] / 2])) break;
@@ -285,7 +292,7 @@ static remap_status touch_cell(edge_query *q, rm_lid j)
     rm_boxtree_query(m2->skin_tree, m2->skin_box, q->box, touch_edges_of_skin, q);
   } else {
     RM_TRY(need_tree(b, 1));
-    rm_boxtree_query(b->tree[1], (const double (*)[6])b->box[1], q->box, touch_edges_of, q);
+    rm_boxtree_query(b->tree[1], b->box[1], q->box, touch_edges_of, q);
   }
   return q->status;
 }

@@ -44,7 +44,7 @@ typedef struct tracer {
   rm_arena         *scratch;
   rm_states         states;
   const rm_boxtree *all_tree; /* over all triangles of other; built when first needed */
-  double          (*all_box)[6];
+  const double    (*all_box)[6];
   hit              *hits; /* crossings of the present edge, ascending along it */
   int64_t           hits_room;
   int               num_hits;
@@ -196,17 +196,24 @@ static int collect_hit(void *user, rm_lid item)
 static remap_status need_all_tree(tracer *t)
 {
   const rm_trimesh *m = t->other;
+  double          (*box)[6];
 
   if (t->all_tree) return REMAP_OK;
-  RM_NEW(t->all_box, t->scratch, m->num_triangles);
+  if (m->num_skin == m->num_triangles) { /* a closed surface: all is skin, in the same order */
+    t->all_tree = m->skin_tree;
+    t->all_box  = m->skin_box;
+    return REMAP_OK;
+  }
+  RM_NEW(box, t->scratch, m->num_triangles);
   for (rm_lid b = 0; b < m->num_triangles; b++) {
     const double *v[3] = {m->vertex[m->triangle[b][0]], m->vertex[m->triangle[b][1]], m->vertex[m->triangle[b][2]]};
     for (int c = 0; c < 3; c++) {
-      t->all_box[b][c]     = fmin(v[0][c], fmin(v[1][c], v[2][c]));
-      t->all_box[b][c + 3] = fmax(v[0][c], fmax(v[1][c], v[2][c]));
+      box[b][c]     = fmin(v[0][c], fmin(v[1][c], v[2][c]));
+      box[b][c + 3] = fmax(v[0][c], fmax(v[1][c], v[2][c]));
     }
   }
-  return rm_boxtree_build(t->scratch, m->num_triangles, (const double (*)[6])t->all_box, &t->all_tree);
+  t->all_box = (const double (*)[6])box;
+  return rm_boxtree_build(t->scratch, m->num_triangles, t->all_box, &t->all_tree);
 }
 
 /* All crossings of the present edge, ascending along it, into t->hits. */
@@ -216,7 +223,7 @@ static remap_status all_hits(tracer *t)
 
   RM_TRY(need_all_tree(t));
   t->num_hits = 0;
-  rm_boxtree_query_segment(t->all_tree, (const double (*)[6])t->all_box, t->p0, t->p1, collect_hit, &c);
+  rm_boxtree_query_segment(t->all_tree, t->all_box, t->p0, t->p1, collect_hit, &c);
   RM_TRY(c.status);
   sort_hits(t, t->hits, t->num_hits);
   return REMAP_OK;
