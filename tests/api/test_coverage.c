@@ -94,6 +94,48 @@ static void the_least_covered_cells_come_first_on_every_rank(void)
   carried_close(&w);
 }
 
-RT_MAIN(RT_CASE(cells_covered_too_little_count_as_uncovered),
+/* ---- blending ---------------------------------------------------------------------------------------------------------- */
+
+/* Where the target sticks out of the source on three sides. */
+static tm_mesh *shifted(av_kind kind, int n)
+{
+  tm_mesh *mesh = av_mesh(kind, n, -0.02);
+
+  tm_move(mesh, tm_affine, (double[]){1, 0, 0, 0.13, 0, 1, 0, -0.21, 0, 0, 1, 0.08});
+  return mesh;
+}
+
+static void fields_that_a_polynomial_holds_are_blended_exactly(void)
+{
+  static const struct {
+    av_field *field;
+    int       order;
+  } way[] = {{av_linear, 2}, {av_linear, 3}, {av_quadratic, 3}};
+
+  for (int kind = 0; kind < AV_NUM_KINDS; kind++) {
+    carried w;
+
+    if (carried_open(&w, MPI_COMM_WORLD, 3, av_mesh(AV_HEXAHEDRA, 7, 0.03), shifted((av_kind)kind, kind == AV_HEXAHEDRA ? 6 : 8), 3))
+      for (size_t k = 0; k < sizeof way / sizeof *way; k++) {
+        const remap_field_desc field = {.name = "u", .has_old = 1, .in = w.mean[0], .out = w.got[1]};
+        remap_field_report     report;
+        remap_transfer         how;
+
+        remap_transfer_default(&how);
+        how.order = way[k].order, how.limiter = REMAP_LIMITER_NONE;
+        carried_evaluate(&w, way[k].field);
+        for (int64_t c = 0; c < w.cells[1]; c++) w.got[1][c] = w.mean[1][c];
+        RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &field, &report), REMAP_OK);
+        for (int64_t c = 0; c < w.cells[1]; c++)
+          if (!RT_NEAR(w.got[1][c], w.mean[1][c], 1e-12)) break;
+        RT_CHECK(report.conservation_error <= 1e-14 && report.blended_cells > 50 && report.kept_cells > 0);
+        RT_EQ(report.normalised_cells + report.nearest_cells + report.filled_cells, 0);
+      }
+    carried_close(&w);
+  }
+}
+
+RT_MAIN(RT_CASE(fields_that_a_polynomial_holds_are_blended_exactly),
+        RT_CASE(cells_covered_too_little_count_as_uncovered),
         RT_CASE(thresholds_beyond_one_or_unlike_on_two_ranks_are_refused),
         RT_CASE(the_least_covered_cells_come_first_on_every_rank))

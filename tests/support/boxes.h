@@ -237,6 +237,7 @@ static inline rm_transfer_setup boxes_setup(const boxes_world *w, remap_directio
                              .giving_rows       = &w->mapping->rows[giving],
                              .giving_stencil    = w->stencil[giving],
                              .receiving_stencil = w->stencil[receiving],
+                             .keeping_stencil   = w->stencil[receiving],
                              .any_partial       = number[REMAP_PARTIAL] > 0,
                              .any_uncovered     = number[REMAP_UNCOVERED] > 0};
 }

@@ -105,9 +105,10 @@ static const rm_stencil **stencil_of(remap_context *ctx, remap_side side, bool i
 }
 
 /* Likewise the wider one for order 3. */
-static const rm_stencil **wide_of(remap_context *ctx, remap_side side)
+static const rm_stencil **wide_of(remap_context *ctx, remap_side side, bool is_giving)
 {
-  return ctx->gives[side] ? &ctx->giving_wide[side] : &ctx->wide[side];
+  if (is_giving) return ctx->gives[side] ? &ctx->giving_wide[side] : &ctx->wide[side];
+  return ctx->wants[side] ? &ctx->wanting_wide[side] : &ctx->wide[side];
 }
 
 /* is_wide: with what order 3 needs. */
@@ -122,8 +123,9 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction,
                              .receiving         = ctx->mesh[receiving],
                              .rows              = &mapping->rows[receiving],
                              .giving_rows       = &mapping->rows[giving],
-                             .giving_stencil    = is_wide ? *wide_of(ctx, giving) : *stencil_of(ctx, giving, true),
+                             .giving_stencil    = is_wide ? *wide_of(ctx, giving, true) : *stencil_of(ctx, giving, true),
                              .receiving_stencil = *stencil_of(ctx, receiving, false),
+                             .keeping_stencil   = is_wide ? *wide_of(ctx, receiving, false) : *stencil_of(ctx, receiving, false),
                              .giving_second     = ctx->second[giving],
                              .receiving_second  = ctx->second[receiving],
                              .giving_layout     = ctx->layout[giving],
@@ -159,14 +161,15 @@ static remap_status need_second(remap_context *ctx)
   return rm_comm_agree(&ctx->comm, status, NULL);
 }
 
-/* The wider stencil of the giving side, whose stencil and second moments are there. Collective. */
-static remap_status need_wide(remap_context *ctx, remap_side giving)
+/* The wider stencil of a side in a role, whose stencil and second moments are there. Collective. */
+static remap_status need_wide(remap_context *ctx, remap_side side, bool is_giving)
 {
-  const rm_stencil **wide = wide_of(ctx, giving);
+  const rm_stencil **wide = wide_of(ctx, side, is_giving);
+  const uint8_t     *mask = is_giving ? ctx->gives[side] : ctx->wants[side];
 
   if (*wide) return REMAP_OK;
-  return rm_stencil_widen(ctx->gives[giving] ? ctx->mask_arena : ctx->stencil_arena[giving], &ctx->comm, &ctx->frame,
-                          ctx->mesh[giving], ctx->second[giving], *stencil_of(ctx, giving, true), wide);
+  return rm_stencil_widen(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side],
+                          ctx->second[side], *stencil_of(ctx, side, is_giving), wide);
 }
 
 /* Make the carrier that a load needs, and what it rests on. Collective. */
@@ -180,9 +183,10 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
   ctx->carrier_arena[direction] = rm_arena_new();
   RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
-  if (load.has_nearest) RM_TRY(need_stencil(ctx, 1 - giving, false));
+  if (load.has_nearest || load.is_blended) RM_TRY(need_stencil(ctx, 1 - giving, false));
   if (load.is_wide || load.is_curved) RM_TRY(need_second(ctx));
-  if (load.is_wide) RM_TRY(need_wide(ctx, giving));
+  if (load.is_wide) RM_TRY(need_wide(ctx, giving, true));
+  if (load.is_wide && load.is_blended) RM_TRY(need_wide(ctx, 1 - giving, false));
   const rm_transfer_setup setup = setup_of(ctx, direction, load.is_wide);
   RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));
   ctx->load[direction] = load;

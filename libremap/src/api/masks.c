@@ -14,6 +14,7 @@ void rm_context_drop_masks(remap_context *ctx)
     ctx->giving_stencil[k]  = NULL;
     ctx->giving_wide[k]     = NULL;
     ctx->wanting_stencil[k] = NULL;
+    ctx->wanting_wide[k]    = NULL;
   }
   memset(ctx->view, 0, sizeof ctx->view);
 }

@@ -8,8 +8,9 @@
  * mean is over the covered part alone (which has been kept within the bounds) or over more than that. */
 static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, double bounds[2])
 {
-  const rm_rows *rows  = w->setup->rows;
-  const uint8_t  cover = rows->cover[cell];
+  const rm_rows *rows          = w->setup->rows;
+  const uint8_t  cover         = rows->cover[cell];
+  const int64_t  place_in_pack = (int64_t)cell * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;
 
   if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]]) return false;
   if (!(w->setup->receiving->cell_volume[cell] > 0.0)) return false;
@@ -18,6 +19,7 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   if (cover == REMAP_PARTIAL) {
     if (!rm_keeps_old(w->how, &w->fields[f], cover)) return false;
     bounds[0] = bounds[1] = RM_VALUE_SCALE * old;
+    for (int b = 0; b < 2 && w->keeping; b++) bounds[b] = w->keeping->pack[place_in_pack + b];
   }
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
     const double *given = w->got + (int64_t)rows->giver[k] * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;

@@ -16,6 +16,8 @@ struct rm_carrier {
   rm_transfer_setup setup;
   rm_load           load;       /* the most it can carry                                       */
   rm_profile        giving;     /* of the giving cells                                         */
+  rm_profile        keeping;    /* of old content that receiving cells keep, if they blend it  */
+  double           *kept, *kept_number; /* [receiving cells][num_fields] likewise               */
   double           *given;      /* [giving cells][num_fields] as the caller gave them            */
   double           *number;     /* [giving cells][num_fields] what is reconstructed; given itself without systems */
   double           *old;        /* [receiving cells][num_fields] values before, if CAAS needs them */
@@ -53,6 +55,21 @@ static remap_status make_packing(rm_arena *arena, const rm_load *load, rm_packin
   return REMAP_OK;
 }
 
+/* What old content takes. */
+static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
+{
+  const rm_transfer_setup *setup = &c->setup;
+  const int64_t            num   = rm_mul_sat(setup->receiving->num_cells, c->load.num_fields);
+
+  RM_NEW(c->kept, arena, num);
+  c->kept_number = c->kept;
+  if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, num);
+  c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, true};
+  c->keeping.given  = c->kept;
+  c->keeping.number = c->kept_number;
+  return rm_profile_init(arena, &c->load, &c->keeping);
+}
+
 /* All memory that transfers need. Not collective. */
 static remap_status make_room(rm_arena *arena, rm_carrier *c)
 {
@@ -70,10 +87,11 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->count, arena, NUM_COUNTS * (int64_t)n);
   RM_NEW(c->fields, arena, n);
-  c->giving.ground = (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second};
+  c->giving.ground = (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, false};
   c->giving.given  = c->given;
   c->giving.number = c->number;
   RM_TRY(rm_profile_init(arena, &c->load, &c->giving));
+  if (c->load.is_blended) RM_TRY(make_keeping(arena, c));
   if (c->load.is_settled) {
     RM_NEW(c->old, arena, rm_mul_sat(setup->receiving->num_cells, n));
     RM_NEW(c->sum, arena, 3 * (int64_t)n);
@@ -106,6 +124,7 @@ void rm_carrier_abandon(rm_carrier *c)
   if (!rm_carrier_is_under_way(c)) return;
   c->is_under_way = false;
   rm_profile_abandon(&c->giving, c->setup.comm, &c->word);
+  rm_profile_abandon(&c->keeping, c->setup.comm, &c->word);
   if (c->given_flow.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->given_flow, &c->word.note);
 }
 
@@ -129,6 +148,15 @@ static remap_status check_coverage(const rm_carrier *c, rm_reason *reason)
   return REMAP_OK;
 }
 
+/* Is any field's old content reconstructed? */
+static bool blends(const rm_carrier *c)
+{
+  bool any = false;
+
+  for (int f = 0; f < c->packing.num_fields; f++) any |= rm_is_blended(&c->setup, &c->how, &c->fields[f]);
+  return any;
+}
+
 /* Values from the caller's arrays, checked, turned and converted. The first failure ends it. */
 static remap_status gather(rm_carrier *c)
 {
@@ -144,6 +172,7 @@ static remap_status gather(rm_carrier *c)
     RM_TRY(rm_gather_numbers(setup->giving, setup->giving_rows, &c->packing, c->given, c->number, "the", reason));
     RM_TRY(rm_gather_amounts(setup, &c->packing, c->value, c->room, reason));
   }
+  if (blends(c)) rm_gather_kept(setup, &c->packing, c->kept, c->kept_number);
   return check_coverage(c, reason);
 }
 
@@ -167,6 +196,7 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   c->how.rotation = NULL; /* the caller's again */
   if (num_fields == 0) return;
   rm_profile_post(&c->giving, c->setup.comm, &c->packing, &c->word);
+  if (blends(c)) rm_profile_post(&c->keeping, c->setup.comm, &c->packing, &c->word);
   if (!rm_profile_reads_halo(&c->packing)) give(c);
 }
 
@@ -212,11 +242,19 @@ static void carry(rm_carrier *c, bool wants_integral)
   const int  num         = c->packing.num_fields;
   const bool is_settled  = rm_profile_reads_halo(&c->packing) && c->how.limiter == REMAP_LIMITER_CAAS;
   bool       any_nearest = false;
-  rm_receipt receipt = {&c->setup, &c->how, c->fields, &c->packing, NULL, c->value, c->room, wants_integral ? c->integral : NULL};
+  rm_receipt receipt     = {.setup    = &c->setup,
+                            .how      = &c->how,
+                            .fields   = c->fields,
+                            .packing  = &c->packing,
+                            .value    = c->value,
+                            .room     = c->room,
+                            .keeping  = blends(c) ? &c->keeping : NULL,
+                            .integral = wants_integral ? c->integral : NULL};
 
   for (int f = 0; f < num; f++) any_nearest |= c->setup.any_uncovered && rm_needs_nearest(&c->how, &c->fields[f]);
   if (rm_profile_reads_halo(&c->packing)) {
     rm_profile_finish(&c->giving, c->setup.comm, &c->packing, &c->word);
+    if (blends(c)) rm_profile_finish(&c->keeping, c->setup.comm, &c->packing, &c->word);
     give(c);
   }
   rm_word_await(&c->word, c->setup.comm, &c->given_flow);

@@ -55,9 +55,10 @@ typedef struct rm_transfer_setup {
   const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals  */
   const rm_stencil *giving_stencil; /* NULL if order 1; widened if order 3                           */
   const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
+  const rm_stencil *keeping_stencil; /* of receiving cells that keep old content outside; NULL if order 1; widened if order 3 */
   rm_layout         giving_layout, receiving_layout;
   const double    (*giving_second)[6];    /* rm_mesh_second; NULL unless systems have slopes              */
-  const double    (*receiving_second)[6]; /* likewise; NULL unless order 3 has cells to normalise         */
+  const double    (*receiving_second)[6]; /* likewise; NULL unless such slopes, or order 3, go beyond what is covered */
   bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 
@@ -74,6 +75,7 @@ typedef struct rm_load {
   bool is_checked;  /* limiter auto: slopes and roughness travel too    */
   bool is_wide;     /* of the widened stencil, for order 3            */
   bool is_curved;   /* systems with slopes: second moments of cells   */
+  bool is_blended;  /* old content outside is reconstructed too       */
   bool has_nearest; /* uncovered cells take the nearest mapped cell's */
 } rm_load;
 

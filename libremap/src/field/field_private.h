@@ -94,6 +94,9 @@ static inline int rm_degree(const remap_transfer *how, const remap_field_desc *f
   return !rm_has_slope(how, field) ? 0 : field->system ? 2 : how->order - 1;
 }
 
+/* Is a field's old content, outside of what is covered, reconstructed? */
+bool rm_is_blended(const rm_transfer_setup *setup, const remap_transfer *how, const remap_field_desc *field);
+
 /* Do receiving cells need bounds: all (CAAS, systems), or those in part covered that a reconstruction is taken beyond? */
 bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
 
@@ -160,6 +163,7 @@ typedef struct rm_ground {
   const rm_stencil *stencil;
   const rm_rows    *rows;        /* of its cells                                                               */
   const double    (*second)[6];  /* rm_mesh_second; NULL unless systems have slopes                            */
+  bool              is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
 } rm_ground;
 
 typedef struct rm_profile rm_profile;
@@ -354,6 +358,9 @@ remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *pac
 /* Old values of systems, where they are mixed with new ones, to amounts per volume; room is [num_fields]. BAD_VALUE. */
 remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing *packing, double *value, double *room,
                                rm_reason *reason);
+/* Old values of all fields that are blended, and what is reconstructed of them; NaN where there is no such number. Both are
+ * [receiving cells][num_fields], one array if there are no systems. */
+void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, double *given, double *number);
 /* Into the caller's array. */
 void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, int f, const double *value);
 /* Turn vectors into the frame of those who receive. */
@@ -373,6 +380,7 @@ struct rm_receipt {
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
   double                  *room;     /* [6][num_fields]                                           */
+  const rm_profile        *keeping;  /* of old content; NULL: nobody blends, or there are no slopes */
   rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */
 };
 

@@ -187,3 +187,29 @@ remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing 
   }
   return REMAP_OK;
 }
+
+void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, double *given, double *number)
+{
+  const rm_mesh   *mesh   = setup->receiving;
+  const rm_layout *layout = &setup->receiving_layout;
+  const int        num    = packing->num_fields;
+
+  for (int f = 0; f < num; f++) {
+    const remap_field_desc *field = &packing->fields[f];
+    const bool              is_read = rm_is_blended(setup, packing->how, field);
+
+    for (int b = 0; b < num_strips(layout); b++) {
+      const strip   s   = strip_of(layout, mesh->num_cells, b, field->out_block != NULL, field->out_stride);
+      const double *out = out_of(field, b);
+
+      for (rm_lid i = s.first; i < s.end; i++)
+        given[(int64_t)i * num + f] = is_read && setup->rows->cover[i] != REMAP_UNWANTED ? out[place_of(&s, i)] : 0.0;
+    }
+  }
+  for (rm_lid c = 0; c < mesh->num_cells && packing->num_systems > 0; c++) {
+    int bad;
+
+    if (!rm_system_numbers(packing, given + (int64_t)c * num, number + (int64_t)c * num, &bad))
+      for (int f = 0; f < num; f++) number[(int64_t)c * num + f] = packing->system_of[f] < 0 ? given[(int64_t)c * num + f] : (double)NAN;
+  }
+}

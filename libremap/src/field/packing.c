@@ -14,6 +14,11 @@ bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, 
          (normalises && how->limiter != REMAP_LIMITER_NONE && setup->any_partial);
 }
 
+bool rm_is_blended(const rm_transfer_setup *setup, const remap_transfer *how, const remap_field_desc *field)
+{
+  return setup->any_partial && how->on_partial == REMAP_PARTIAL_BLEND && field->has_old && rm_has_slope(how, field);
+}
+
 /* Is a field the first of its system? */
 static bool is_first(const remap_field_desc *fields, int f)
 {
@@ -37,6 +42,7 @@ rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, in
     load.is_curved |= is_sloped && fields[f].system > 0;
     load.is_settled |= is_sloped && how->limiter == REMAP_LIMITER_CAAS;
     load.is_checked |= is_sloped && how->limiter == REMAP_LIMITER_AUTO;
+    load.is_blended |= rm_is_blended(setup, how, &fields[f]);
     load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
   }
   return load;
@@ -54,6 +60,7 @@ rm_load rm_load_max(rm_load a, rm_load b)
                    .is_checked  = a.is_checked || b.is_checked,
                    .is_wide     = a.is_wide || b.is_wide,
                    .is_curved   = a.is_curved || b.is_curved,
+                   .is_blended  = a.is_blended || b.is_blended,
                    .has_nearest = a.has_nearest || b.has_nearest};
 }
 
@@ -61,7 +68,7 @@ bool rm_load_covers(rm_load a, rm_load b)
 {
   return a.num_fields >= b.num_fields && a.width >= b.width && a.num_systems >= b.num_systems && a.has_slopes >= b.has_slopes &&
          a.is_settled >= b.is_settled && a.is_checked >= b.is_checked && a.is_wide >= b.is_wide && a.is_curved >= b.is_curved &&
-         a.has_nearest >= b.has_nearest;
+         a.is_blended >= b.is_blended && a.has_nearest >= b.has_nearest;
 }
 
 void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,

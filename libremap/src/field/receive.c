@@ -135,24 +135,64 @@ static bool is_normalised(const rm_receipt *w, int f, rm_lid cell)
   return cover == REMAP_PARTIAL && !rm_keeps_old(w->how, &w->fields[f], cover) && w->how->on_partial != REMAP_PARTIAL_CONSERVE;
 }
 
-/* The scaled new value of a cell with pairs that is not normalised; its part in the integral goes to integral, if that is not NULL. */
-static double receive_content(const rm_receipt *w, int f, rm_lid cell, double old, const row_sums *s, rm_integral *integral)
+/* Add the old content of a cell on what its pairs leave of it, scaled: as if it were uniform, and what slopes add. Moments of what is
+ * left are those of the cell less those of the pairs. */
+static void add_kept(const rm_receipt *w, int f, rm_lid cell, double old, const row_sums *s, double *content, double *change)
 {
-  const double volume   = w->setup->receiving->cell_volume[cell];
-  const bool   is_blend = rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
-  double       value;
+  const rm_rows *rows   = w->setup->rows;
+  const rm_mesh *mesh   = w->setup->receiving;
+  const double   volume = mesh->cell_volume[cell] - s->volume;
+  rm_compensated sum    = {0.0, 0.0};
+  const double  *at, *g, *h;
 
-  old *= RM_VALUE_SCALE;
-  if (is_void(volume, s))
-    value = is_blend ? old : plain_mean(w, f, cell, s);
-  else
-    value = is_blend ? (s->content + old * (volume - s->volume)) / volume : s->content / volume;
+  *content += RM_VALUE_SCALE * old * volume;
+  if (!w->keeping || w->packing->degree[f] == 0 || !rm_is_blended(w->setup, w->how, &w->fields[f])) return;
+  at = w->keeping->pack + (int64_t)cell * w->packing->width + w->packing->at[f];
+  g  = at + RM_PACK_SLOPE;
+  h  = at + rm_pack_curvature(w->packing->has_bounds);
+  if (w->packing->degree[f] > 1) {
+    rm_compensated_add(&sum, rm_dot6(h, w->setup->receiving_second[cell]));
+    rm_compensated_add(&sum, h[6] * volume);
+  }
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    double m[3], second[6];
+
+    rm_moments_about(rows, k, mesh->cell_centroid[cell], m, second);
+    rm_compensated_add(&sum, -(g[0] * m[0] + g[1] * m[1] + g[2] * m[2]));
+    if (w->packing->degree[f] > 1) rm_compensated_add(&sum, -rm_dot6(h, second));
+  }
+  *change += rm_compensated_value(&sum);
+}
+
+/* The old content of a field outside of systems. */
+static double kept_content(const rm_receipt *w, int f, rm_lid cell, double old, const row_sums *s)
+{
+  double content = 0.0, change = 0.0;
+
+  add_kept(w, f, cell, old, s, &content, &change);
+  return content + change;
+}
+
+static bool is_blend(const rm_receipt *w, int f, rm_lid cell)
+{
+  return rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
+}
+
+/* The scaled new value of a cell with pairs that is not normalised, from what it gets and what it keeps, 0 unless it blends; its part
+ * in the integral goes to integral, if that is not NULL. */
+static double receive_content(const rm_receipt *w, int f, rm_lid cell, double old, double kept, const row_sums *s,
+                              rm_integral *integral)
+{
+  const double volume = w->setup->receiving->cell_volume[cell];
+  double       value  = (s->content + kept) / volume;
+
+  if (is_void(volume, s)) {
+    value = is_blend(w, f, cell) ? RM_VALUE_SCALE * old : plain_mean(w, f, cell, s);
+    kept  = is_blend(w, f, cell) ? value * (volume - s->volume) : 0.0;
+  }
   if (integral) {
     rm_integral_add(&integral->minus_target, -value, volume);
-    if (is_blend) {
-      rm_integral_add(&integral->minus_target, old, volume);
-      rm_integral_add(&integral->minus_target, -old, s->volume);
-    }
+    rm_integral_add(&integral->minus_target, 1.0, kept);
   }
   return value;
 }
@@ -182,7 +222,11 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
   if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
   if (!rows->same[first]) {
     s = sum_row(w, f, cell);
-    if (!is_normalised(w, f, cell)) return receive_content(w, f, cell, old, &s, integral) / RM_VALUE_SCALE;
+    if (!is_normalised(w, f, cell)) {
+      const double kept = is_blend(w, f, cell) ? kept_content(w, f, cell, old, &s) : 0.0;
+
+      return receive_content(w, f, cell, old, kept, &s, integral) / RM_VALUE_SCALE;
+    }
     if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
     return normalised(w, f, cell, &s) / RM_VALUE_SCALE;
   }
@@ -218,29 +262,57 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, doubl
     if (p->system_of[f] == system) value[f] = (mean[f] + factor * change[f]) / RM_VALUE_SCALE;
 }
 
-/* The new values of a system in a mapped cell: amounts, to be converted; copies are converted for the integrals alone. */
+/* The old content of a system, its slopes scaled until it is a state that can be. kept receives it, scaled. */
+static void keep_system(const rm_receipt *w, int system, rm_lid cell, const double *old, double *kept)
+{
+  const rm_packing *p      = w->packing;
+  const int         num    = p->num_fields;
+  const rm_limits   limits = {w->room, w->room + num};
+  double           *change = w->room + 2 * num, volume = 0.0, factor = 0.0;
+
+  for (int f = 0; f < num; f++) {
+    row_sums s;
+
+    kept[f] = change[f] = 0.0;
+    if (p->system_of[f] != system) continue;
+    s = sum_row(w, f, cell);
+    add_kept(w, f, cell, old[f], &s, &kept[f], &change[f]);
+    volume = w->setup->receiving->cell_volume[cell] - s.volume;
+  }
+  if (w->keeping) {
+    rm_limits_clear(p, limits);
+    rm_limits_add(p, w->keeping->pack + (int64_t)cell * p->width, limits);
+    factor = rm_admit_factor(p, system, kept, change, volume, limits, 0x1p-44);
+  }
+  for (int f = 0; f < num; f++) kept[f] += factor * change[f];
+}
+
+/* The new values of a system in a mapped cell: amounts, to be converted, but for copies. */
 static void receive_system(const rm_receipt *w, int system, rm_lid cell, double *value)
 {
   const rm_packing *p     = w->packing;
   const rm_rows    *rows  = w->setup->rows;
   const int64_t     first = rows->offset[cell];
-  const double     *given = w->got + (int64_t)rows->giver[first] * p->width;
-  const bool        is_same = rows->same[first] != 0;
+  const int         density = p->system[system].density;
+  const double     *given   = w->got + (int64_t)rows->giver[first] * p->width;
+  double           *kept    = w->room + 4 * p->num_fields;
 
-  if (!is_same && is_normalised(w, p->system[system].density, cell)) {
+  if (!rows->same[first] && is_normalised(w, density, cell)) {
     normalise_system(w, system, cell, value);
     return;
   }
+  for (int f = 0; f < p->num_fields; f++) kept[f] = 0.0;
+  if (!rows->same[first] && is_blend(w, density, cell)) keep_system(w, system, cell, value, kept);
   for (int f = 0; f < p->num_fields; f++) {
     row_sums s;
 
     if (p->system_of[f] != system) continue;
-    if (is_same) {
+    if (rows->same[first]) {
       value[f] = given[p->at[f]];
       continue;
     }
     s        = sum_row(w, f, cell);
-    value[f] = receive_content(w, f, cell, value[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
+    value[f] = receive_content(w, f, cell, value[f], kept[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
   }
 }
 

@@ -228,6 +228,11 @@ static void reconstruct_cell(const rm_profile *w, const rm_packing *packing, rm_
   }
 }
 
+static bool is_asked(const rm_ground *ground, uint8_t cover)
+{
+  return ground->is_keeping ? cover == REMAP_PARTIAL : rm_is_mapped(cover);
+}
+
 void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t which)
 {
   const rm_rows *rows = w->ground.rows;
@@ -236,14 +241,14 @@ void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t whic
   for (rm_lid c = 0; c < w->ground.mesh->num_cells; c++) { /* cells first: their weights are read once for all fields */
     const double *given = w->given + (int64_t)c * num, *number = w->number + (int64_t)c * num;
     double       *place = w->pack + (int64_t)c * packing->width;
-    const bool    is_mapped = rm_is_mapped(rows->cover[c]), is_same = is_mapped && rows->same[rows->offset[c]];
+    const bool    asked = is_asked(&w->ground, rows->cover[c]), is_same = asked && rows->same[rows->offset[c]];
 
     if (w->needs_halo[c] != which) continue;
     for (int f = 0; f < num; f++) {
       place[packing->at[f]] = is_same ? given[f] : rm_system_amount(packing, f, given, number);
-      for (int k = RM_PACK_SLOPE; k < rm_pack_width(packing->degree[f], packing->has_bounds) && !is_mapped; k++)
+      for (int k = RM_PACK_SLOPE; k < rm_pack_width(packing->degree[f], packing->has_bounds) && !asked; k++)
         place[packing->at[f] + k] = 0.0; /* nobody asks for it */
     }
-    if (is_mapped) reconstruct_cell(w, packing, c, place);
+    if (asked) reconstruct_cell(w, packing, c, place);
   }
 }
