@@ -188,6 +188,10 @@ typedef struct remap_mesh {
   const int64_t *cell_place;     /**< [num_cells] where the cell's values stand in the arrays of fields, not counting
                                       strides: leaves out halo cells; NULL: cell c at place c                */
 
+  const double  *cell_volume;    /**< [num_cells] the solver's own volumes, positive, where it integrates otherwise than over
+                                      triangulated faces: CONSERVED fields and systems keep their integrals by them; NULL: those
+                                      of the triangulated cells                            */
+
   const char        *name;             /**< used in messages, say the file's name; may be NULL           */
   int64_t            num_zones;        /**< 0 if the mesh has no zones                                   */
   const char *const *zone_name;        /**< [num_zones] used in messages                                 */
@@ -271,6 +275,9 @@ typedef struct remap_stats {
   int     ranks;
   int64_t cells[2];               /**< [side] */
   double  volume[2];              /**< [side] sum of abs(cell volume) */
+  double  solver_volume[2];       /**< [side] the same by remap_mesh.cell_volume; volume where none are given */
+  double  max_volume_difference[2]; /**< [side] largest abs(solver's volume / own - 1), 0 where none are given */
+  int64_t worst_volume_cell[2];   /**< [side] its global id, the smallest if several have it; -1 where none are given */
   int64_t inverted_cells[2];      /**< [side] cells of negative volume */
   int64_t worst_inverted_cell[2]; /**< [side] global id of the one of most negative volume, -1 if there is none */
   int64_t pairs;                  /**< (source cell, target cell) that share volume */

@@ -121,6 +121,21 @@ static remap_status join_ids(rm_arena *passing, int side, int num_blocks, const 
   return REMAP_OK;
 }
 
+/* Solver volumes of all blocks, 0 where there are none. */
+static remap_status join_volumes(rm_arena *passing, int num_blocks, const remap_mesh *block, remap_mesh *out)
+{
+  double *volume = NULL;
+  int64_t num    = 0;
+  bool    has    = false;
+
+  for (int b = 0; b < num_blocks; b++) has |= block[b].cell_volume != NULL;
+  if (has) RM_NEW(volume, passing, out->num_cells);
+  for (int b = 0; b < num_blocks && has; b++)
+    for (int64_t c = 0; c < block[b].num_cells; c++) volume[num++] = block[b].cell_volume ? block[b].cell_volume[c] : 0.0;
+  out->cell_volume = volume;
+  return REMAP_OK;
+}
+
 static remap_status join(rm_arena *passing, int side, int num_blocks, const remap_mesh *block, remap_mesh *out,
                          rm_reason *reason)
 {
@@ -157,6 +172,7 @@ static remap_status join(rm_arena *passing, int side, int num_blocks, const rema
   out->face_node      = node;
   out->face_owner     = owner;
   out->face_neighbour = neighbour;
+  RM_TRY(join_volumes(passing, num_blocks, block, out));
   return join_ids(passing, side, num_blocks, block, out, reason);
 }
 

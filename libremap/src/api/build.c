@@ -90,6 +90,9 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
   for (int side = 0; side < 2; side++) {
     s->cells[side]              = ctx->mesh[side]->num_global_cells;
     s->volume[side]             = ctx->mesh[side]->volume * cubed;
+    s->solver_volume[side]         = ctx->solver_volume[side];
+    s->max_volume_difference[side] = ctx->max_volume_difference[side];
+    s->worst_volume_cell[side]     = ctx->worst_volume_cell[side];
     s->inverted_cells[side]     = ctx->mesh[side]->num_inverted;
     s->worst_inverted_cell[side] = ctx->mesh[side]->worst_inverted;
     s->max_closure_error[side]  = m->max_closure_error[side];

@@ -47,6 +47,9 @@ struct remap_context {
   rm_frame          frame;
   const rm_mesh    *mesh[2];
   rm_layout         layout[2];
+  const double     *measure[2]; /* [side][cells] the solver's volume over the own one; NULL: 1 in all cells of all ranks */
+  double            solver_volume[2], max_volume_difference[2]; /* [side] as in remap_stats */
+  rm_gid            worst_volume_cell[2];
   rm_arena         *stencil_arena[2]; /* [side] */
   const rm_stencil *stencil[2];       /* [side] of all cells; made when first needed */
   const rm_stencil *wide[2];          /* [side] likewise, for order 3                */
@@ -91,6 +94,9 @@ remap_status rm_context_triangulate(remap_context *ctx, int side);
 
 /* Forget where cells are overlaid. Not collective. */
 void rm_context_drop_place(remap_context *ctx);
+
+/* Compare the solver's volumes of one side, which lie as given, with those of its mesh. Collective. BAD_MESH. */
+remap_status rm_context_measure(remap_context *ctx, int side, const remap_mesh *given, rm_reason *reason);
 
 /* Forget meshes and their stencils. Not collective. */
 void rm_context_drop_meshes(remap_context *ctx);

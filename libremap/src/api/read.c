@@ -131,6 +131,7 @@ remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena
     if (is_new[side])
       RM_TRY(rm_mesh_build(ctx->mesh_arena[side], &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side],
                            reason));
+    if (is_new[side]) RM_TRY(rm_context_measure(ctx, side, &given[side], reason));
     RM_TRY(rm_comm_agree_reason(&ctx->comm, rm_context_progress(ctx, "checking of meshes", 0.5 * (side + 1)), reason));
   }
   return REMAP_OK;

@@ -30,6 +30,14 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   return isfinite(bounds[0]) && isfinite(bounds[1]);
 }
 
+/* A cell's volume, by the solver's measure for amounts. */
+static double volume_of(const rm_receipt *w, int f, rm_lid cell)
+{
+  const double volume = w->setup->receiving->cell_volume[cell];
+
+  return w->setup->receiving_measure && rm_is_amount(w->packing, f) ? volume * w->setup->receiving_measure[cell] : volume;
+}
+
 static double clip(double x, const double bounds[2]) { return fmin(fmax(x, bounds[0]), bounds[1]); }
 
 void rm_caas_sum(const rm_receipt *w, const double *old, rm_sum *sum)
@@ -39,7 +47,7 @@ void rm_caas_sum(const rm_receipt *w, const double *old, rm_sum *sum)
   for (int k = 0; k < 3 * num; k++) rm_sum_clear(&sum[k]);
   for (rm_lid c = 0; c < w->setup->receiving->num_cells; c++)
     for (int f = 0; f < num; f++) {
-      const double volume = w->setup->receiving->cell_volume[c], value = RM_VALUE_SCALE * w->value[(int64_t)c * num + f];
+      const double volume = volume_of(w, f, c), value = RM_VALUE_SCALE * w->value[(int64_t)c * num + f];
       double       bounds[2], clipped;
 
       if (!isfinite(value) || !bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
@@ -61,7 +69,7 @@ void rm_caas_settle(const rm_receipt *w, const double *old, const rm_sum *sum, i
 
     for (rm_lid c = 0; c < w->setup->receiving->num_cells; c++) {
       double      *place  = &w->value[(int64_t)c * num + f], bounds[2], settled;
-      const double volume = w->setup->receiving->cell_volume[c], value = RM_VALUE_SCALE * *place;
+      const double volume = volume_of(w, f, c), value = RM_VALUE_SCALE * *place;
 
       if (!isfinite(value) || !bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
       settled = clip(value, bounds);

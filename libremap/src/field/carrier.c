@@ -64,7 +64,7 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->kept, arena, num);
   c->kept_number = c->kept;
   if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, num);
-  c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, true};
+  c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, NULL, true};
   c->keeping.given  = c->kept;
   c->keeping.number = c->kept_number;
   return rm_profile_init(arena, &c->load, &c->keeping);
@@ -87,7 +87,8 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->count, arena, NUM_COUNTS * (int64_t)n);
   RM_NEW(c->fields, arena, n);
-  c->giving.ground = (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, false};
+  c->giving.ground = (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure,
+                                  false};
   c->giving.given  = c->given;
   c->giving.number = c->number;
   RM_TRY(rm_profile_init(arena, &c->load, &c->giving));

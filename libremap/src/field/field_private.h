@@ -97,6 +97,12 @@ static inline int rm_degree(const remap_transfer *how, const remap_field_desc *f
 /* Is a field's old content, outside of what is covered, reconstructed? */
 bool rm_is_blended(const rm_transfer_setup *setup, const remap_transfer *how, const remap_field_desc *field);
 
+/* Is a field one of amounts, of which integrals count? */
+static inline bool rm_is_amount(const rm_packing *packing, int f)
+{
+  return packing->system_of[f] >= 0 || packing->fields[f].nature == REMAP_CONSERVED;
+}
+
 /* Do receiving cells need bounds: all (CAAS, systems), or those in part covered that a reconstruction is taken beyond? */
 bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
 
@@ -163,6 +169,7 @@ typedef struct rm_ground {
   const rm_stencil *stencil;
   const rm_rows    *rows;        /* of its cells                                                               */
   const double    (*second)[6];  /* rm_mesh_second; NULL unless systems have slopes                            */
+  const double     *measure;     /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
   bool              is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
 } rm_ground;
 

@@ -63,6 +63,12 @@ static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
   return (row_sums){rm_compensated_value(&content), rm_compensated_value(&volume), magnitude};
 }
 
+/* The solver's volume of a cell over that of the mesh, for amounts. */
+static double measure_of(const rm_receipt *w, int f, rm_lid cell)
+{
+  return w->setup->receiving_measure && rm_is_amount(w->packing, f) ? w->setup->receiving_measure[cell] : 1.0;
+}
+
 /* True if a volume is what cancellation left of the parts it is made of: nothing may be divided by it. */
 static bool is_void(double volume, const row_sums *s) { return !(fabs(volume) > 0x1p-40 * s->magnitude); }
 
@@ -183,15 +189,17 @@ static bool is_blend(const rm_receipt *w, int f, rm_lid cell)
 static double receive_content(const rm_receipt *w, int f, rm_lid cell, double old, double kept, const row_sums *s,
                               rm_integral *integral)
 {
-  const double volume = w->setup->receiving->cell_volume[cell];
-  double       value  = (s->content + kept) / volume;
+  const double volume = w->setup->receiving->cell_volume[cell], measure = measure_of(w, f, cell);
+  double       value;
 
+  kept *= measure;
+  value = (s->content + kept) / volume / measure;
   if (is_void(volume, s)) {
-    value = is_blend(w, f, cell) ? RM_VALUE_SCALE * old : plain_mean(w, f, cell, s);
-    kept  = is_blend(w, f, cell) ? value * (volume - s->volume) : 0.0;
+    value = is_blend(w, f, cell) ? RM_VALUE_SCALE * old : plain_mean(w, f, cell, s) / measure;
+    kept  = is_blend(w, f, cell) ? value * (volume - s->volume) * measure : 0.0;
   }
   if (integral) {
-    rm_integral_add(&integral->minus_target, -value, volume);
+    rm_integral_add(&integral->minus_target, -value * measure, volume);
     rm_integral_add(&integral->minus_target, 1.0, kept);
   }
   return value;
@@ -228,10 +236,11 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
       return receive_content(w, f, cell, old, kept, &s, integral) / RM_VALUE_SCALE;
     }
     if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
-    return normalised(w, f, cell, &s) / RM_VALUE_SCALE;
+    return normalised(w, f, cell, &s) / measure_of(w, f, cell) / RM_VALUE_SCALE;
   }
   copied = w->got[(int64_t)rows->giver[first] * w->packing->width + w->packing->at[f]];
-  if (integral) rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied, w->setup->receiving->cell_volume[cell]);
+  if (integral)
+    rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied * measure_of(w, f, cell), w->setup->receiving->cell_volume[cell]);
   return copied;
 }
 
@@ -259,7 +268,7 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, doubl
   }
   if (p->degree[p->system[system].density] > 0) factor = rm_admit_factor(p, system, mean, change, 1.0, limits, 0x1p-44);
   for (int f = 0; f < num; f++)
-    if (p->system_of[f] == system) value[f] = (mean[f] + factor * change[f]) / RM_VALUE_SCALE;
+    if (p->system_of[f] == system) value[f] = (mean[f] + factor * change[f]) / measure_of(w, f, cell) / RM_VALUE_SCALE;
 }
 
 /* The old content of a system, its slopes scaled until it is a state that can be. kept receives it, scaled. */
@@ -325,7 +334,7 @@ static void integrate_copies(const rm_receipt *w, rm_lid cell, const double *val
   if (!w->integral || !rm_system_numbers(w->packing, value, number, &bad)) return;
   for (int f = 0; f < w->packing->num_fields; f++)
     if (w->packing->system_of[f] >= 0)
-      rm_integral_add(&w->integral[f].minus_target, -RM_VALUE_SCALE * rm_system_amount(w->packing, f, value, number),
+      rm_integral_add(&w->integral[f].minus_target, -RM_VALUE_SCALE * rm_system_amount(w->packing, f, value, number) * measure_of(w, f, cell),
                       w->setup->receiving->cell_volume[cell]);
 }
 

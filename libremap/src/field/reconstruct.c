@@ -228,6 +228,19 @@ static void reconstruct_cell(const rm_profile *w, const rm_packing *packing, rm_
   }
 }
 
+/* Amounts by the solver's volumes. */
+static void measure_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, double *place)
+{
+  for (int f = 0; f < packing->num_fields; f++) {
+    double *at = place + packing->at[f];
+
+    if (!rm_is_amount(packing, f)) continue;
+    at[0] *= w->ground.measure[cell];
+    for (int d = 0; d < 3 && packing->degree[f] > 0; d++) at[RM_PACK_SLOPE + d] *= w->ground.measure[cell];
+    for (int k = 0; k < 7 && packing->degree[f] > 1; k++) at[rm_pack_curvature(packing->has_bounds) + k] *= w->ground.measure[cell];
+  }
+}
+
 static bool is_asked(const rm_ground *ground, uint8_t cover)
 {
   return ground->is_keeping ? cover == REMAP_PARTIAL : rm_is_mapped(cover);
@@ -250,5 +263,6 @@ void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t whic
         place[packing->at[f] + k] = 0.0; /* nobody asks for it */
     }
     if (asked) reconstruct_cell(w, packing, c, place);
+    if (asked && w->ground.measure && !is_same) measure_cell(w, packing, c, place);
   }
 }
