@@ -400,7 +400,7 @@ static void memory_that_runs_out_is_told(void)
     rm_arena       *arena = rm_arena_new();
     const rm_cells *cells = NULL;
     rm_arena_fail_at(arena, ++n);
-    status = rm_cells_build(arena, &l->part, l->overlay, &(rm_cells_choice){.keep = SUPER_UNION}, &cells, NULL);
+    status = rm_cells_build(arena, &l->part, l->overlay, NULL, &(rm_cells_choice){.keep = SUPER_UNION}, &cells, NULL);
     RT_CHECK((cells != NULL) == (status == REMAP_OK));
     rm_arena_drop(arena);
   }

@@ -31,7 +31,7 @@ static inline super super_of(const tm_mesh *source, const tm_mesh *target, remap
     s.status = rm_cells_mesh(s.l->arena, &s.l->frame, s.l->mesh[side], &s.mesh[side]);
   if (s.status == REMAP_OK && (s.mesh[0] != s.l->mesh[0] || s.mesh[1] != s.l->mesh[1]))
     s.status = rm_overlay_build(s.l->arena, s.mesh, &s.l->part, NULL, &o, &s.l->reason);
-  if (s.status == REMAP_OK) s.status = rm_cells_build(s.l->arena, &s.l->part, o, &choice, &s.cells, &s.l->reason);
+  if (s.status == REMAP_OK) s.status = rm_cells_build(s.l->arena, &s.l->part, o, NULL, &choice, &s.cells, &s.l->reason);
   return s;
 }
 

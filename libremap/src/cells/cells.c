@@ -23,14 +23,24 @@ typedef struct work {
 
 /* ---- stages ------------------------------------------------------------------------------------------------------------- */
 
-static remap_status make_polygons(work *w, const rm_overlay *o, rm_reason *reason)
+static remap_status make_polygons(work *w, const rm_overlay *overlay, rm_arena **overlay_arena, rm_reason *reason)
 {
   const double start   = rm_seconds();
   rm_arena    *passing = rm_arena_new();
-  remap_status status  = passing ? rm_limit_build(w->limit_arena, passing, w->part, o, &w->l, reason) : REMAP_NO_MEMORY;
+  rm_overlay  *o       = rm_arena_alloc(w->limit_arena, 1, sizeof *o);
+  remap_status status  = passing && o ? REMAP_OK : REMAP_NO_MEMORY;
 
+  if (status == REMAP_OK) {
+    *o     = *overlay;
+    status = rm_limit_build(w->limit_arena, passing, w->part, o, &w->l, reason);
+  }
   if (status == REMAP_OK) status = rm_polygons_build(w->part, w->l, &w->p, reason);
   rm_arena_drop(passing);
+  if (status == REMAP_OK && overlay_arena) {
+    *o = (rm_overlay){.mesh = {o->mesh[0], o->mesh[1]}}; /* all that is asked for from here on */
+    rm_arena_drop(*overlay_arena);
+    *overlay_arena = NULL;
+  }
   w->out->num_polygons     = w->p.num;
   w->out->seconds_polygons = rm_seconds() - start;
   return status;
@@ -260,15 +270,15 @@ static remap_status make_faces(work *w)
   return REMAP_OK;
 }
 
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_cells_choice *choice,
-                            const rm_cells **out, rm_reason *reason)
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
+                            const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason)
 {
   work         w      = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part, .choice = choice};
   remap_status status = w.scratch && w.limit_arena ? REMAP_OK : REMAP_NO_MEMORY;
 
   w.out = rm_arena_zero(arena, 1, sizeof *w.out);
   if (!w.out) status = REMAP_NO_MEMORY;
-  if (status == REMAP_OK) status = make_polygons(&w, overlay, reason);
+  if (status == REMAP_OK) status = make_polygons(&w, overlay, passing, reason);
   if (status == REMAP_OK) status = make_cells(&w, reason);
   if (status == REMAP_OK) status = select_cells(&w);
   const double start = rm_seconds();

@@ -59,9 +59,10 @@ remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trim
 /* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
  * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH with the
  * reason if cells of one mesh overlap or cross each other. The meshes of the overlay have no flat triangles: see rm_cells_mesh.
- * O(n log n) in crossings, n^2 in the vertices of a face with holes. */
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, const rm_cells_choice *choice,
-                            const rm_cells **out, rm_reason *reason);
+ * *passing (may be NULL) is the arena that holds the overlay, but not its meshes: it is dropped, and NULL then, as soon as it is used
+ * up. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
+                            const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason);
 
 /* Every invariant above but the last; slow. Not collective. INTERNAL if one is broken. */
 remap_status rm_cells_check(const rm_cells *cells);

@@ -26,8 +26,8 @@ typedef struct rm_limit {
   rm_lid            num_spots;
   const rm_spot    *spot;            /* [num_spots] those of mesh 1's vertices, of mesh 2's, of crossings      */
   const double    (*xyz)[3];         /* [num_spots] rounded                                                    */
-  const double    (*low)[3];         /* [num_spots] what rounding took from xyz: volumes far from the origin need it */
-  const double     *error;           /* [num_spots] bound of the error of each coordinate                      */
+  const float     (*low)[3];         /* [num_spots] what rounding took from xyz: volumes far from the origin need it */
+  const float      *error;           /* [num_spots] bound of the error of each coordinate                      */
   const rm_lid     *vertex_spot[2];  /* [side][num_vertices]                                                   */
   const rm_lid     *crossing_spot[2]; /* [side][crossings of its edges]                                        */
   const int64_t    *line_offset[2];  /* [side][num_edges + 1]                                                  */
@@ -158,15 +158,19 @@ typedef struct rm_arc {
   rm_lid polygon; /* 2 * polygon + (1 if that runs from the higher vertex on) */
 } rm_arc;
 
-/* Edges by their lower vertex, then by the higher one, then by polygon. */
+/* The edges of all polygons, by their lower vertex. */
 typedef struct rm_arcs {
-  rm_lid         num_vertices;
-  const int64_t *offset; /* [num_vertices + 1] */
-  const rm_arc  *arc;
+  rm_lid             num_vertices;
+  const rm_polygons *p;
+  const int64_t     *offset;  /* [num_vertices + 1]                                               */
+  const rm_lid      *polygon; /* ascending at each vertex: those with an edge to a higher one     */
+  rm_arc            *arc;     /* those of one vertex: what rm_arcs_at found last                  */
 } rm_arcs;
 
-/* Lives in arena. Vertices of the polygons are below num_vertices. TOO_LARGE from 2^30 polygons on. O(n), expected. */
+/* Lives in arena. Vertices of the polygons are below num_vertices. TOO_LARGE from 2^30 polygons on. O(n). */
 remap_status rm_arcs_build(rm_arena *arena, rm_lid num_vertices, const rm_polygons *p, rm_arcs *out);
+/* How many edges have this lower vertex; they are in arcs->arc then, by their higher vertex, then by polygon. O(n log n). */
+rm_lid rm_arcs_at(const rm_arcs *arcs, rm_lid low);
 
 /* ---- cells ----------------------------------------------------------------------------------------------------------- */
 

@@ -55,9 +55,9 @@ static void join_pieces(const grouping *g, rm_lid *parent, uint8_t *inner)
   const rm_arcs *arcs = g->arcs;
 
   for (rm_lid v = 0; v < arcs->num_vertices; v++)
-    for (int64_t k = arcs->offset[v], end; k < arcs->offset[v + 1]; k = end) {
+    for (rm_lid k = 0, end, num = rm_arcs_at(arcs, v); k < num; k = end) {
       const rm_arc *arc = arcs->arc + k;
-      for (end = k + 1; end < arcs->offset[v + 1] && arcs->arc[end].high == arc->high;) end++;
+      for (end = k + 1; end < num && arcs->arc[end].high == arc->high;) end++;
       if (end != k + 2 || !belong_together(g, arc[0].polygon / 2, arc[1].polygon / 2)) continue;
       const rm_lid a = root(parent, arc[0].polygon / 2), b = root(parent, arc[1].polygon / 2);
       if (a < b) parent[b] = a;
@@ -127,9 +127,9 @@ static remap_status mark_enclosed(rm_arena *passing, const grouping *g, const rm
 
   RM_NEW0(list, passing, faces->num);
   for (rm_lid v = 0; v < arcs->num_vertices; v++)
-    for (int64_t k = arcs->offset[v], end; k < arcs->offset[v + 1]; k = end) {
+    for (rm_lid k = 0, end, num = rm_arcs_at(arcs, v); k < num; k = end) {
       rm_lid n = 0;
-      for (end = k; end < arcs->offset[v + 1] && arcs->arc[end].high == arcs->arc[k].high; end++)
+      for (end = k; end < num && arcs->arc[end].high == arcs->arc[k].high; end++)
         if (n <= CANDIDATES) around[n++] = group_of[arcs->arc[end].polygon / 2];
       if (faces->inner[g->p->polygon[arcs->arc[k].polygon / 2].first + arcs->arc[k].place]) continue;
       for (rm_lid i = 0; i < n; i++) meet(&list[around[i]], around[i], around, n);

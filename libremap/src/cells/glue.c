@@ -136,10 +136,10 @@ static remap_status join_by_angle(work *w, rm_lid p, const rm_arc *arc, rm_lid n
 static remap_status join_sides(work *w)
 {
   for (rm_lid v = 0; v < w->arcs->num_vertices; v++)
-    for (int64_t k = w->arcs->offset[v], next; k < w->arcs->offset[v + 1]; k = next) {
+    for (rm_lid k = 0, next, num = rm_arcs_at(w->arcs, v); k < num; k = next) {
       const rm_arc *arc = w->arcs->arc + k;
-      for (next = k + 1; next < w->arcs->offset[v + 1] && w->arcs->arc[next].high == arc->high;) next++;
-      if (!join_by_label(w, arc, (rm_lid)(next - k))) RM_TRY(join_by_angle(w, v, arc, (rm_lid)(next - k)));
+      for (next = k + 1; next < num && w->arcs->arc[next].high == arc->high;) next++;
+      if (!join_by_label(w, arc, next - k)) RM_TRY(join_by_angle(w, v, arc, next - k));
     }
   return REMAP_OK;
 }
@@ -151,7 +151,7 @@ static inline double largest(const double x[3]) { return fmax(fabs(x[0]), fmax(f
 /* From spot o to spot p, as if both had not been rounded. */
 static inline void between(const rm_limit *l, rm_lid o, rm_lid p, double out[3])
 {
-  for (int k = 0; k < 3; k++) out[k] = (l->xyz[p][k] - l->xyz[o][k]) + (l->low[p][k] - l->low[o][k]);
+  for (int k = 0; k < 3; k++) out[k] = (l->xyz[p][k] - l->xyz[o][k]) + ((double)l->low[p][k] - (double)l->low[o][k]);
 }
 
 /* Six times the volume of the cone from spot o over a polygon; if noise is not NULL, a bound of its error is added to *noise. */
@@ -166,7 +166,7 @@ static double cone(const work *w, const rm_polygon *g, rm_lid o, double *noise)
     between(w->l, o, v[i], c);
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
     const double reach = noise ? fmax(largest(a), fmax(largest(b), largest(c))) : 0;
-    if (noise) *noise += reach * reach * (0x1p-46 * reach + 16 * (w->l->error[v[0]] + w->l->error[v[i - 1]] + w->l->error[v[i]]));
+    if (noise) *noise += reach * reach * (0x1p-46 * reach + 16 * ((double)w->l->error[v[0]] + (double)w->l->error[v[i - 1]] + (double)w->l->error[v[i]]));
     memcpy(b, c, sizeof b);
   }
   return sum;

@@ -401,7 +401,8 @@ static remap_status crossing_spots(builder *b, int side)
 
 static remap_status coordinates(builder *b)
 {
-  double (*xyz)[3], (*low)[3], *error;
+  double (*xyz)[3];
+  float (*low)[3], *error;
   rm_spot *spot;
 
   RM_NEW(spot, b->arena, b->l->num_spots);
@@ -422,15 +423,15 @@ static remap_status coordinates(builder *b)
       const double u = line[1][c] - line[0][c];
       const rm_dd  x = rm_two_sum(line[0][c], lambda * u);
       xyz[p][c] = x.hi;
-      low[p][c] = x.lo;
+      low[p][c] = (float)x.lo;
       size      = fmax(size, fabs(u));
       reach     = fmax(reach, fmax(fabs(line[0][c]), fabs(line[1][c])));
     }
-    error[p] = 0x1p-48 * size + 0x1p-52 * reach;
+    error[p] = (float)fmax(0x1.1p-48 * size + 0x1.1p-52 * reach, 0x1p-120); /* no smaller as a float */
   }
   b->l->spot  = spot;
   b->l->xyz   = (const double (*)[3])xyz;
-  b->l->low   = (const double (*)[3])low;
+  b->l->low   = (const float (*)[3])low;
   b->l->error = error;
   return REMAP_OK;
 }

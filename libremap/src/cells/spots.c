@@ -198,7 +198,7 @@ int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r)
   const double *a = v->l->xyz[p], *b = v->l->xyz[q], *c = v->l->xyz[r];
   const double  ux = b[v->x] - a[v->x], uy = b[v->y] - a[v->y], vx = c[v->x] - a[v->x], vy = c[v->y] - a[v->y];
   const double  left = ux * vy, right = uy * vx, det = left - right;
-  const double  e = v->l->error[p] + v->l->error[q] + v->l->error[r];
+  const double  e = (double)v->l->error[p] + (double)v->l->error[q] + (double)v->l->error[r];
   const double  bound = 0x1p-50 * (fabs(left) + fabs(right)) + 2 * e * (fabs(ux) + fabs(uy) + fabs(vx) + fabs(vy) + e);
 
   if (det > bound) return v->flip;
@@ -209,7 +209,7 @@ int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r)
 
 int rm_compare(const rm_limit *l, rm_lid p, rm_lid q, int axis)
 {
-  const double diff = l->xyz[p][axis] - l->xyz[q][axis], bound = 2 * (l->error[p] + l->error[q]);
+  const double diff = l->xyz[p][axis] - l->xyz[q][axis], bound = 2 * ((double)l->error[p] + (double)l->error[q]);
 
   if (p == q) return 0;
   if (diff > bound) return 1;

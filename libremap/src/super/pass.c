@@ -17,7 +17,7 @@ typedef struct work {
   rm_arena           *scratch;
   const rm_super_job *job;
   const rm_cover     *cover;
-  const rm_overlay   *o;
+  const rm_trimesh *const *trimesh; /* [side] */
   const rm_cells     *cells;
   rm_soup            *soup;
   rm_lid             *soup_cell[2]; /* [side][cells of the mesh] -1 if it does not pass    */
@@ -68,7 +68,7 @@ static rm_lid cell_behind(const work *w, rm_lid f, int *side)
 /* The caller's face of which triangle t, or one that lies on it, is part for the given cell. */
 static rm_lid face_at_home(const work *w, int side, rm_lid t, rm_lid cell)
 {
-  const rm_trimesh *m = w->o->mesh[side];
+  const rm_trimesh *m = w->trimesh[side];
 
   for (rm_lid k = t; k < m->num_triangles && !memcmp(m->triangle[k], m->triangle[t], sizeof *m->triangle); k++)
     for (int h = 0; h < 2; h++)
@@ -194,10 +194,10 @@ static remap_status add_all_faces(work *w)
   return REMAP_OK;
 }
 
-remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_overlay *overlay, const rm_cells *cells,
+remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
                            rm_soup *soup)
 {
-  work         w = {.scratch = rm_arena_new(), .job = job, .cover = cover, .o = overlay, .cells = cells, .soup = soup};
+  work         w = {.scratch = rm_arena_new(), .job = job, .cover = cover, .trimesh = mesh, .cells = cells, .soup = soup};
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(job->comm, w.scratch ? add_cells(&w) : REMAP_NO_MEMORY, NULL));

@@ -68,17 +68,17 @@ remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell)
 /* ---- what room cells made -------------------------------------------------------------------------------------------------- */
 
 /* The corner that vertex v of mesh `side` is; made when first met. */
-static remap_status corner_of(rm_soup *soup, const rm_overlay *o, rm_lid *const corner_of_vertex[2], int side, rm_lid v, rm_lid *out)
+static remap_status corner_of(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2], int side, rm_lid v, rm_lid *out)
 {
   rm_lid *c = &corner_of_vertex[side][v];
 
-  if (*c < 0) RM_TRY(add_corner(soup, o->mesh[side]->vertex[v], c));
+  if (*c < 0) RM_TRY(add_corner(soup, mesh[side]->vertex[v], c));
   *out = *c;
   return REMAP_OK;
 }
 
 /* Corners of what the vertex is made of; features of two meshes in an order that does not depend on which mesh is the first. */
-static remap_status add_spot(rm_soup *soup, const rm_overlay *o, rm_lid *const corner_of_vertex[2], const rm_spot *spot, const double xyz[3])
+static remap_status add_spot(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2], const rm_spot *spot, const double xyz[3])
 {
   rm_soup_vertex v = {{xyz[0], xyz[1], xyz[2]}, {-1, -1, -1, -1, -1}, 0};
   int            n = 0, first = spot->at[0].kind == RM_ON_EDGE ? 0 : 1;
@@ -88,11 +88,11 @@ static remap_status add_spot(rm_soup *soup, const rm_overlay *o, rm_lid *const c
   for (int k = 0; k < 2; k++) {
     const int         side = k ? 1 - first : first;
     const rm_feature  f    = spot->at[side];
-    const rm_trimesh *m    = o->mesh[side];
+    const rm_trimesh *m    = mesh[side];
     const rm_lid     *list = f.kind == RM_ON_VERTEX ? &f.id : f.kind == RM_ON_EDGE ? m->edge[f.id] : m->triangle[f.id];
     const int         num  = f.kind == RM_ON_VERTEX ? 1 : f.kind == RM_ON_EDGE ? 2 : 3;
 
-    for (int h = 0; h < num; h++) RM_TRY(corner_of(soup, o, corner_of_vertex, side, list[h], &v.corner[n++]));
+    for (int h = 0; h < num; h++) RM_TRY(corner_of(soup, mesh, corner_of_vertex, side, list[h], &v.corner[n++]));
     if (f.kind == RM_ON_VERTEX) break;
     if (k == 0) v.kind = 1 + side;
     else if (f.kind == RM_ON_EDGE) v.kind = 3;
@@ -100,17 +100,17 @@ static remap_status add_spot(rm_soup *soup, const rm_overlay *o, rm_lid *const c
   return add_vertex(soup, &v);
 }
 
-static remap_status add_vertices(rm_soup *soup, rm_arena *passing, const rm_overlay *o, const rm_cells *cells)
+static remap_status add_vertices(rm_soup *soup, rm_arena *passing, const rm_trimesh *const mesh[2], const rm_cells *cells)
 {
   rm_lid *corner_of_vertex[2];
 
   for (int side = 0; side < 2; side++) {
-    RM_NEW(corner_of_vertex[side], passing, o->mesh[side]->num_vertices);
-    for (rm_lid v = 0; v < o->mesh[side]->num_vertices; v++) corner_of_vertex[side][v] = -1;
+    RM_NEW(corner_of_vertex[side], passing, mesh[side]->num_vertices);
+    for (rm_lid v = 0; v < mesh[side]->num_vertices; v++) corner_of_vertex[side][v] = -1;
   }
   RM_TRY(rm_grow(&soup->vertex, &soup->vertex_room, soup->num_vertices + cells->num_vertices, sizeof *soup->vertex));
   for (rm_lid v = 0; v < cells->num_vertices; v++)
-    RM_TRY(add_spot(soup, o, corner_of_vertex, &cells->vertex_spot[v], cells->vertex[v]));
+    RM_TRY(add_spot(soup, mesh, corner_of_vertex, &cells->vertex_spot[v], cells->vertex[v]));
   return REMAP_OK;
 }
 
@@ -129,12 +129,12 @@ static remap_status add_cell(rm_soup *soup, const rm_part *part, const rm_cells 
 }
 
 /* The caller's face of which triangle t is part: of two, that of the lower rank and number. */
-static void origin_of(const rm_part *part, const rm_overlay *o, int side, rm_lid t, rm_soup_face *out)
+static void origin_of(const rm_part *part, const rm_trimesh *const mesh[2], int side, rm_lid t, rm_soup_face *out)
 {
   const rm_piece *p = &part->piece[side];
 
   for (int h = 0; h < 2 && t >= 0; h++) {
-    const rm_lid f = o->mesh[side]->triangle_face[t][h];
+    const rm_lid f = mesh[side]->triangle_face[t][h];
     if (f < 0) continue;
     const int    rank = p->cell_home_rank[p->face_cell[f][0]];
     const rm_lid home = p->face_home[f];
@@ -144,23 +144,23 @@ static void origin_of(const rm_part *part, const rm_overlay *o, int side, rm_lid
   }
 }
 
-static remap_status add_face(rm_soup *soup, const rm_part *part, const rm_overlay *o, const rm_cells *cells, rm_lid f, rm_lid first_vertex,
+static remap_status add_face(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells, rm_lid f, rm_lid first_vertex,
                              rm_lid first_cell)
 {
   const rm_lid *cell = cells->face_cell[f];
   rm_soup_face  face = {0, {first_cell + cell[0], cell[1] < 0 ? -1 : first_cell + cell[1]}, {-1, -1}, {-1, -1}};
 
-  for (int side = 0; side < 2; side++) origin_of(part, o, side, cells->face_triangle[f][side], &face);
+  for (int side = 0; side < 2; side++) origin_of(part, mesh, side, cells->face_triangle[f][side], &face);
   for (int64_t k = cells->face_offset[f]; k < cells->face_offset[f + 1]; k++)
     RM_TRY(rm_soup_add_to_loop(soup, first_vertex + cells->face_vertex[k]));
   return rm_soup_end_face(soup, face);
 }
 
-remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_overlay *overlay, const rm_cells *cells)
+remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells)
 {
   const rm_lid first_vertex = (rm_lid)soup->num_vertices, first_cell = (rm_lid)soup->num_cells;
   rm_arena    *passing = rm_arena_new();
-  remap_status status  = passing ? add_vertices(soup, passing, overlay, cells) : REMAP_NO_MEMORY;
+  remap_status status  = passing ? add_vertices(soup, passing, mesh, cells) : REMAP_NO_MEMORY;
 
   rm_arena_drop(passing);
   RM_TRY(status);
@@ -168,6 +168,6 @@ remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_over
   RM_TRY(rm_grow(&soup->face, &soup->face_room, soup->num_faces + cells->num_faces + 2, sizeof *soup->face));
   RM_TRY(rm_grow(&soup->loop, &soup->loop_room, soup->num_loop + cells->face_offset[cells->num_faces], sizeof *soup->loop));
   for (rm_lid c = 0; c < cells->num_cells; c++) RM_TRY(add_cell(soup, part, cells, c));
-  for (rm_lid f = 0; f < cells->num_faces; f++) RM_TRY(add_face(soup, part, overlay, cells, f, first_vertex, first_cell));
+  for (rm_lid f = 0; f < cells->num_faces; f++) RM_TRY(add_face(soup, part, mesh, cells, f, first_vertex, first_cell));
   return REMAP_OK;
 }

@@ -5,9 +5,10 @@
 
 typedef struct work {
   const rm_super_job *job;
-  rm_arena           *passing; /* of all that the result does not need */
+  rm_arena           *passing;       /* of all that the result does not need */
+  rm_arena           *overlay_arena; /* of crossings and segments */
   const rm_cover     *cover;
-  const rm_overlay   *overlay;
+  const rm_trimesh   *mesh[2];
   const rm_cells     *cells;
   rm_soup             soup;
   remap_supermesh_view figures; /* counts and times */
@@ -36,27 +37,27 @@ static remap_status make_cells(work *w, rm_reason *reason)
   const remap_supermesh_options *options = w->job->options;
   const rm_cells_choice choice = {options->keep, w->cover->owner, {w->cover->flag[0], w->cover->flag[1]}, options->aggregate != 0,
                                   options->split_concave != 0};
-  const rm_trimesh     *mesh[2];
-  double                start = rm_seconds();
+  const rm_overlay     *overlay = NULL;
+  double                start   = rm_seconds();
 
   for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &mesh[side]));
-    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, mesh[side], &mesh[side]));
-    w->figures.num_triangles[side] = mesh[side]->num_triangles;
+    RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &w->mesh[side]));
+    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, w->mesh[side], &w->mesh[side]));
+    w->figures.num_triangles[side] = w->mesh[side]->num_triangles;
   }
   w->figures.seconds_triangulation = rm_seconds() - start;
   RM_TRY(tell(w, "triangulation", 1));
   start = rm_seconds();
-  RM_TRY(rm_overlay_build(w->passing, mesh, &w->cover->part, w->job->progress, &w->overlay, reason));
+  RM_TRY(rm_overlay_build(w->overlay_arena, w->mesh, &w->cover->part, w->job->progress, &overlay, reason));
   w->figures.seconds_crossings = rm_seconds() - start;
-  w->figures.num_crossings     = w->overlay->trace[0].num_crossings + w->overlay->trace[1].num_crossings;
-  RM_TRY(rm_cells_build(w->passing, &w->cover->part, w->overlay, &choice, &w->cells, reason));
+  w->figures.num_crossings     = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
+  RM_TRY(rm_cells_build(w->passing, &w->cover->part, overlay, &w->overlay_arena, &choice, &w->cells, reason));
   w->figures.num_polygons     = w->cells->num_polygons;
   w->figures.seconds_polygons = w->cells->seconds_polygons;
   w->figures.seconds_cells    = w->cells->seconds_glue;
   w->figures.seconds_faces    = w->cells->seconds_faces;
   RM_TRY(tell(w, "cells of the supermesh", 1));
-  return rm_soup_add_cells(&w->soup, &w->cover->part, w->overlay, w->cells);
+  return rm_soup_add_cells(&w->soup, &w->cover->part, w->mesh, w->cells);
 }
 
 /* What the soup has is no longer needed elsewhere. */
@@ -71,7 +72,7 @@ static remap_status build(rm_arena *arena, work *w, rm_super *out, rm_reason *re
   RM_TRY(cover(w, reason));
   RM_TRY(rm_comm_agree_reason(w->job->comm, make_cells(w, reason), reason));
   const double start = rm_seconds();
-  RM_TRY(rm_super_pass(w->job, w->cover, w->overlay, w->cells, &w->soup));
+  RM_TRY(rm_super_pass(w->job, w->cover, w->mesh, w->cells, &w->soup));
   drop_passing(w);
   RM_TRY(rm_super_finish(arena, w->job, &w->soup, out));
   w->figures.seconds_numbering = rm_seconds() - start;
@@ -95,16 +96,17 @@ static void add_figures(const remap_supermesh_view *figures, remap_supermesh_vie
 
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
 {
-  work         w   = {.job = job, .passing = rm_arena_new()};
+  work         w   = {.job = job, .passing = rm_arena_new(), .overlay_arena = rm_arena_new()};
   rm_super    *new = rm_arena_zero(arena, 1, sizeof *new);
   remap_status status;
 
-  RM_GOTO(done, status = rm_comm_agree(job->comm, w.passing && new ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(w.passing && new);
+  RM_GOTO(done, status = rm_comm_agree(job->comm, w.passing && w.overlay_arena && new ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(w.passing && w.overlay_arena && new);
   RM_GOTO(done, status = build(arena, &w, new, reason));
   add_figures(&w.figures, &new->view);
   *out = new;
 done:
+  rm_arena_drop(w.overlay_arena);
   rm_arena_drop(w.passing);
   rm_soup_free(&w.soup);
   return status;

@@ -52,11 +52,11 @@ remap_status rm_soup_add_to_loop(rm_soup *soup, rm_lid vertex);
 remap_status rm_soup_end_face(rm_soup *soup, rm_soup_face face);
 remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell);
 /* Add what room cells made. Not collective. */
-remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_overlay *overlay, const rm_cells *cells);
+remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells);
 
 /* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which are
  * behind faces of `cells`, home, and add those that come. Collective. */
-remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_overlay *overlay, const rm_cells *cells,
+remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
                            rm_soup *soup);
 
 /* Number n keys of `words` words each, key[n][words], over all ranks: equal keys get one number, from 0 without gaps, in the
