@@ -57,7 +57,7 @@ static remap_status number_vertices(work *w, rm_arena *passing, int64_t *number)
   return rm_super_number(passing, w->job->comm, s->num_vertices, RM_SOUP_CORNERS, &key[0][0], number, &w->v.global_nodes);
 }
 
-/* Nodes of the result: distinct vertices in order. The soup's loops become loops of nodes. */
+/* Nodes of the result: distinct vertices in order. The soup's loops become loops of nodes; it has no vertices any more. */
 static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number)
 {
   const rm_soup *s    = w->soup;
@@ -84,6 +84,7 @@ static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number
     for (int c = 0; c < 3; c++) xyz[to][c] = s->vertex[i].xyz[c] * unit;
   }
   for (int64_t k = 0; k < s->num_loop; k++) s->loop[k] = node_of[s->loop[k]];
+  rm_soup_drop_vertices(w->soup);
   w->v.num_nodes   = n;
   w->v.node_global = global;
   w->v.node_xyz    = &xyz[0][0];

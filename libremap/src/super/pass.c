@@ -194,6 +194,28 @@ static remap_status add_all_faces(work *w)
   return REMAP_OK;
 }
 
+remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup)
+{
+  const work w    = {.job = job, .cover = cover};
+  int64_t    passing = 0, faces = 0, corners = 0, nodes = 0;
+
+  for (int side = 0; side < 2; side++) {
+    const rm_mesh *m = job->mesh[side];
+
+    if (!passes(&w, side)) continue;
+    for (rm_lid c = 0; c < m->num_cells; c++) {
+      if (cover->is_met[side][c]) continue;
+      passing++;
+      faces += m->cell_face_offset[c + 1] - m->cell_face_offset[c];
+      for (int64_t k = m->cell_face_offset[c]; k < m->cell_face_offset[c + 1]; k++)
+        corners += m->face_offset[m->cell_face[k] + 1] - m->face_offset[m->cell_face[k]];
+    }
+    nodes += corners < m->num_nodes ? corners : m->num_nodes;
+  }
+  return rm_soup_reserve(soup, cells->num_vertices + nodes, cells->num_faces + faces, cells->face_offset[cells->num_faces] + corners,
+                         cells->num_cells + passing);
+}
+
 remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
                            rm_soup *soup)
 {

@@ -14,6 +14,24 @@ void rm_soup_free(rm_soup *soup)
   free(soup->cell);
 }
 
+void rm_soup_drop_vertices(rm_soup *soup)
+{
+  free(soup->corner);
+  free(soup->vertex);
+  soup->corner       = NULL;
+  soup->vertex       = NULL;
+  soup->num_corners  = soup->num_vertices = 0;
+  soup->corner_room  = soup->vertex_room = 0;
+}
+
+remap_status rm_soup_reserve(rm_soup *soup, int64_t vertices, int64_t faces, int64_t loop, int64_t cells)
+{
+  RM_TRY(rm_grow(&soup->vertex, &soup->vertex_room, soup->num_vertices + vertices, sizeof *soup->vertex));
+  RM_TRY(rm_grow(&soup->face, &soup->face_room, soup->num_faces + faces + 1, sizeof *soup->face));
+  RM_TRY(rm_grow(&soup->loop, &soup->loop_room, soup->num_loop + loop, sizeof *soup->loop));
+  return rm_grow(&soup->cell, &soup->cell_room, soup->num_cells + cells, sizeof *soup->cell);
+}
+
 static remap_status add_corner(rm_soup *soup, const double xyz[3], rm_lid *out)
 {
   if (soup->num_corners == INT32_MAX) return REMAP_TOO_LARGE;
@@ -108,7 +126,6 @@ static remap_status add_vertices(rm_soup *soup, rm_arena *passing, const rm_trim
     RM_NEW(corner_of_vertex[side], passing, mesh[side]->num_vertices);
     for (rm_lid v = 0; v < mesh[side]->num_vertices; v++) corner_of_vertex[side][v] = -1;
   }
-  RM_TRY(rm_grow(&soup->vertex, &soup->vertex_room, soup->num_vertices + cells->num_vertices, sizeof *soup->vertex));
   for (rm_lid v = 0; v < cells->num_vertices; v++)
     RM_TRY(add_spot(soup, mesh, corner_of_vertex, &cells->vertex_spot[v], cells->vertex[v]));
   return REMAP_OK;
@@ -164,9 +181,6 @@ remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trim
 
   rm_arena_drop(passing);
   RM_TRY(status);
-  RM_TRY(rm_grow(&soup->cell, &soup->cell_room, soup->num_cells + cells->num_cells, sizeof *soup->cell));
-  RM_TRY(rm_grow(&soup->face, &soup->face_room, soup->num_faces + cells->num_faces + 2, sizeof *soup->face));
-  RM_TRY(rm_grow(&soup->loop, &soup->loop_room, soup->num_loop + cells->face_offset[cells->num_faces], sizeof *soup->loop));
   for (rm_lid c = 0; c < cells->num_cells; c++) RM_TRY(add_cell(soup, part, cells, c));
   for (rm_lid f = 0; f < cells->num_faces; f++) RM_TRY(add_face(soup, part, mesh, cells, f, first_vertex, first_cell));
   return REMAP_OK;

@@ -57,6 +57,7 @@ static remap_status make_cells(work *w, rm_reason *reason)
   w->figures.seconds_cells    = w->cells->seconds_glue;
   w->figures.seconds_faces    = w->cells->seconds_faces;
   RM_TRY(tell(w, "cells of the supermesh", 1));
+  RM_TRY(rm_super_reserve(w->job, w->cover, w->cells, &w->soup));
   return rm_soup_add_cells(&w->soup, &w->cover->part, w->mesh, w->cells);
 }
 

@@ -46,6 +46,10 @@ typedef struct rm_soup {
 } rm_soup;
 
 void rm_soup_free(rm_soup *soup);
+/* Give back vertices and corners. */
+void rm_soup_drop_vertices(rm_soup *soup);
+/* Room for so much more, and no more than that. NO_MEMORY. */
+remap_status rm_soup_reserve(rm_soup *soup, int64_t vertices, int64_t faces, int64_t loop, int64_t cells);
 /* Add a vertex that is a corner, a face from the last num vertices of the loop, all at the end. NO_MEMORY, TOO_LARGE. */
 remap_status rm_soup_add_corner(rm_soup *soup, const double xyz[3], rm_lid *vertex);
 remap_status rm_soup_add_to_loop(rm_soup *soup, rm_lid vertex);
@@ -54,6 +58,8 @@ remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell);
 /* Add what room cells made. Not collective. */
 remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells);
 
+/* Room for what rm_super_pass adds, about. Not collective. */
+remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup);
 /* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which are
  * behind faces of `cells`, home, and add those that come. Collective. */
 remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
@@ -64,7 +70,7 @@ remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const
 remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
                              int64_t *total);
 
-/* Number the soup and put it in order. Collective. *out lives in arena. The soup's loops are used up. */
+/* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. */
 remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out);
 
 #endif
