@@ -82,8 +82,9 @@ static void add_local(slot *s, double sign, const plane *pl, const point *p, con
   for (int k = 0; k < num_sums; k++) s->sum[k] += out[k];
 }
 
-INLINE void add_of_degree(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q,
-                          int num_sums)
+/* One cone to both its slots. */
+INLINE void add_cone(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q,
+                     int num_sums)
 {
   double out[10];
 
@@ -100,13 +101,49 @@ INLINE void add_of_degree(work *w, rm_lid i, const rm_lid j[2], int kind, double
   }
 }
 
-INLINE void add(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+/* The cones of a side that two polygons share, to the slots of two cells: each slot is fetched once. */
+INLINE void add_two_cones(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                          const point *p, const point *q, int num_sums)
 {
-  add_of_degree(w, i, j, kind, sign, pl, p, q, 4);
+  double out[10], back[10];
+
+  cone(pl->n, pl->height, pl->foot, p->at, q->at, sign, num_sums, out);
+  cone(other->n, other->height, other->foot, p->at, q->at, -sign, num_sums, back);
+  for (int h = 0; h < 2; h++) {
+    if (j[h] < 0) continue;
+    slot *s = find_slot(w, i, j[h]);
+    if (!s) return;
+    s->num_cones += 2;
+    s->kinds |= kind;
+    if (s->is_local) {
+      add_local(s, h ? -sign : sign, pl, p, q, num_sums);
+      add_local(s, h ? sign : -sign, other, p, q, num_sums);
+    } else {
+      for (int k = 0; k < num_sums; k++) s->sum[k] = h ? (s->sum[k] - out[k]) - back[k] : (s->sum[k] + out[k]) + back[k];
+    }
+  }
 }
-INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+
+INLINE void add_of_degree(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                          const point *p, const point *q, int num_sums)
 {
-  add_of_degree(w, i, j, kind, sign, pl, p, q, 10);
+  if (other && j[0] != j[1]) {
+    add_two_cones(w, i, j, kind, sign, pl, other, p, q, num_sums);
+  } else {
+    add_cone(w, i, j, kind, sign, pl, p, q, num_sums);
+    if (other) add_cone(w, i, j, kind, -sign, other, p, q, num_sums);
+  }
+}
+
+INLINE void add(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
+                const point *q)
+{
+  add_of_degree(w, i, j, kind, sign, pl, other, p, q, 4);
+}
+INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
+                  const point *q)
+{
+  add_of_degree(w, i, j, kind, sign, pl, other, p, q, 10);
 }
 
 /* ---- enumeration of the polygons' sides in cell i ------------------------------------------------------------------- */
@@ -155,8 +192,7 @@ INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_
     const plane  pb    = plane_of(w, 1, b);
     const int    kind  = skin | (o->mesh[1]->triangle_is_skin[b] ? SKIN_TARGET : 0);
 
-    add_side(w, i, o->mesh[1]->side[b], kind, g, pt, &p, &q);
-    add_side(w, i, o->mesh[1]->side[b], kind, -g, &pb, &p, &q);
+    add_side(w, i, o->mesh[1]->side[b], kind, g, pt, &pb, &p, &q);
   }
 }
 
@@ -212,7 +248,7 @@ static void tangled_pieces(work *w, rm_lid i, const plane *pt, rm_lid e, rm_lid 
 
     if (end == k) continue;
     const point q = piece_point(w, 0, e, end);
-    add_side(w, i, in, kind, sign * list[z].number, pt, &p, &q);
+    add_side(w, i, in, kind, sign * list[z].number, pt, NULL, &p, &q);
   }
 }
 
@@ -237,7 +273,7 @@ INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *ad
       if (before < RM_OUTSIDE || in[0] < RM_OUTSIDE || next < RM_OUTSIDE || (in[0] >= 0 && (in[0] == before || in[0] == next)))
         tangled_pieces(w, i, pt, e, k, kind, s, add_side);
       else
-        add_side(w, i, in, kind, s, pt, &p, &q);
+        add_side(w, i, in, kind, s, pt, NULL, &p, &q);
       p      = q;
       before = in[0];
       in[0]  = next;
@@ -264,7 +300,7 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
       const plane  pb = plane_of(w, 1, b);
 
       add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0), (m->star[z] & 3) == 2 ? -number : number,
-               &pb, &p, &q);
+               &pb, NULL, &p, &q);
     }
   }
 }
@@ -354,11 +390,15 @@ static void add_cone_dd(work *w, rm_lid j, double sign, const plane *pl, const p
   }
 }
 
-static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q)
+static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
+                   const point *q)
 {
   (void)i, (void)kind;
-  for (int h = 0; h < 2; h++)
-    if (j[h] >= 0) add_cone_dd(w, j[h], h ? -sign : sign, pl, p, q);
+  for (int h = 0; h < 2; h++) {
+    if (j[h] < 0) continue;
+    add_cone_dd(w, j[h], h ? -sign : sign, pl, p, q);
+    if (other) add_cone_dd(w, j[h], h ? sign : -sign, other, p, q);
+  }
 }
 
 /* ---- one source cell ------------------------------------------------------------------------------------------------- */
