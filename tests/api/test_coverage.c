@@ -9,7 +9,10 @@ static tm_mesh *sticking_out(int n)
   return tm_hexahedra((int[]){n, n, n}, tm_affine, (double[]){n * h, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
 }
 
-static bool open_cubes(carried *w) { return carried_open(w, MPI_COMM_WORLD, 2, av_mesh(AV_HEXAHEDRA, 5, 0.03), sticking_out(6), 3); }
+static bool open_cubes(carried *w)
+{
+  return carried_open(w, MPI_COMM_WORLD, 2, av_mesh(AV_HEXAHEDRA, 5, 0.03), sticking_out(6), 3);
+}
 
 static void cells_covered_too_little_count_as_uncovered(void)
 {
@@ -115,7 +118,8 @@ static void fields_that_a_polynomial_holds_are_blended_exactly(void)
   for (int kind = 0; kind < AV_NUM_KINDS; kind++) {
     carried w;
 
-    if (carried_open(&w, MPI_COMM_WORLD, 3, av_mesh(AV_HEXAHEDRA, 7, 0.03), shifted((av_kind)kind, kind == AV_HEXAHEDRA ? 6 : 8), 3))
+    if (carried_open(&w, MPI_COMM_WORLD, 3, av_mesh(AV_HEXAHEDRA, 7, 0.03),
+                     shifted((av_kind)kind, kind == AV_HEXAHEDRA ? 6 : 8), 3))
       for (size_t k = 0; k < sizeof way / sizeof *way; k++) {
         const remap_field_desc field = {.name = "u", .has_old = 1, .in = w.mean[0], .out = w.got[1]};
         remap_field_report     report;
@@ -135,7 +139,6 @@ static void fields_that_a_polynomial_holds_are_blended_exactly(void)
   }
 }
 
-RT_MAIN(RT_CASE(fields_that_a_polynomial_holds_are_blended_exactly),
-        RT_CASE(cells_covered_too_little_count_as_uncovered),
+RT_MAIN(RT_CASE(fields_that_a_polynomial_holds_are_blended_exactly), RT_CASE(cells_covered_too_little_count_as_uncovered),
         RT_CASE(thresholds_beyond_one_or_unlike_on_two_ranks_are_refused),
         RT_CASE(the_least_covered_cells_come_first_on_every_rank))

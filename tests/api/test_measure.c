@@ -28,7 +28,7 @@ static bool open_world(world *w, bool is_by_blocks)
     w->cells[side]  = w->mine[side]->view.num_cells;
     w->volume[side] = tm_alloc_(w->cells[side], sizeof(double));
     w->u[side]      = tm_alloc_(w->cells[side], sizeof(double));
-    double *mean = tm_alloc_(w->cells[side], sizeof(double));
+    double   *mean  = tm_alloc_(w->cells[side], sizeof(double));
     av_field *field = av_constant;
     av_means(w->mine[side], REMAP_FACES_CENTRE, 1, &field, w->volume[side], &mean);
     for (int64_t c = 0; c < w->cells[side]; c++) w->volume[side][c] *= differs(side, w->mine[side]->global[c]);
@@ -92,10 +92,11 @@ static void means_and_velocities_stay_uniform(void)
   if (open_world(&w, false)) {
     double                *in = tm_alloc_(w.cells[0], sizeof *in), *out = tm_alloc_(w.cells[1], sizeof *out);
     double                *density[2] = {tm_alloc_(w.cells[0], sizeof(double)), tm_alloc_(w.cells[1], sizeof(double))};
-    const remap_field_desc field[3] = {{.name = "T", .nature = REMAP_VOLUME_MEAN, .in = in, .out = out},
-                                       {.name = "rho", .system = 2, .role = REMAP_ROLE_DENSITY, .in = density[0], .out = density[1]},
-                                       {.name = "u", .system = 2, .role = REMAP_ROLE_VELOCITY_X, .in = in, .out = w.u[1]}};
-    remap_transfer         how;
+    const remap_field_desc field[3]   = {
+          {.name = "T", .nature = REMAP_VOLUME_MEAN, .in = in, .out = out},
+          {.name = "rho", .system = 2, .role = REMAP_ROLE_DENSITY, .in = density[0], .out = density[1]},
+          {.name = "u", .system = 2, .role = REMAP_ROLE_VELOCITY_X, .in = in, .out = w.u[1]}};
+    remap_transfer how;
 
     remap_transfer_default(&how);
     for (int64_t c = 0; c < w.cells[0]; c++) in[c] = -3.25, density[0][c] = w.mine[0]->global[c] % 2 ? 7 : 1;
@@ -119,9 +120,9 @@ static void statistics_tell_how_volumes_differ(void)
 
     RT_EQ(remap_get_stats(w.ctx, &stats), REMAP_OK);
     for (int side = 0; side < 2; side++) {
-      const int64_t num = stats.cells[side];
+      const int64_t num   = stats.cells[side];
       double        worst = 0;
-      int64_t       cell = -1;
+      int64_t       cell  = -1;
 
       for (int64_t g = 0; g < num; g++)
         if (fabs(differs(side, g) - 1) > worst) worst = fabs(differs(side, g) - 1), cell = g;
@@ -141,9 +142,9 @@ static void volumes_that_are_none_are_refused(void)
   static const double bad[] = {0, -1, NAN, 1e300};
 
   for (int k = 0; k < 4; k++) {
-    tm_mesh       *mesh = tm_hexahedra((int[]){2, 1, 1}, NULL, NULL);
+    tm_mesh       *mesh      = tm_hexahedra((int[]){2, 1, 1}, NULL, NULL);
     double         volume[2] = {0.5, bad[k]};
-    remap_context *ctx = NULL;
+    remap_context *ctx       = NULL;
 
     RT_EQ(remap_create(MPI_COMM_SELF, NULL, &ctx), REMAP_OK);
     RT_EQ(remap_set_mesh(ctx, REMAP_SOURCE, &mesh->view), REMAP_OK);

@@ -1,13 +1,13 @@
-/* Systems of fields: states stay such that can be, what is uniform stays so, amounts are conserved, primitive variables come back.
- * With REMAP_LONG_TESTS the meshes are finer. */
+/* Systems of fields: states stay such that can be, what is uniform stays so, amounts are conserved, primitive variables come
+ * back. With REMAP_LONG_TESTS the meshes are finer. */
 #include "carried.h"
 
 enum { NUM = 5 };
-static const remap_role conserved[NUM] = {REMAP_ROLE_DENSITY, REMAP_ROLE_MOMENTUM_X, REMAP_ROLE_MOMENTUM_Y, REMAP_ROLE_MOMENTUM_Z,
-                                          REMAP_ROLE_ENERGY};
-static const remap_role primitive[NUM] = {REMAP_ROLE_DENSITY, REMAP_ROLE_VELOCITY_X, REMAP_ROLE_VELOCITY_Y, REMAP_ROLE_VELOCITY_Z,
-                                          REMAP_ROLE_PRESSURE};
-static const double     gamma_of_air = 1.4;
+static const remap_role conserved[NUM] = {REMAP_ROLE_DENSITY, REMAP_ROLE_MOMENTUM_X, REMAP_ROLE_MOMENTUM_Y,
+                                          REMAP_ROLE_MOMENTUM_Z, REMAP_ROLE_ENERGY};
+static const remap_role primitive[NUM] = {REMAP_ROLE_DENSITY, REMAP_ROLE_VELOCITY_X, REMAP_ROLE_VELOCITY_Y,
+                                          REMAP_ROLE_VELOCITY_Z, REMAP_ROLE_PRESSURE};
+static const double     gamma_of_air   = 1.4;
 
 /* A gas on both meshes: NUM values per cell, one after the other. */
 typedef struct gas {
@@ -24,7 +24,7 @@ static void shear(const double x[3], double inside, double state[NUM])
   state[0] = inside;
   state[1] = tanh((x[0] - .5) / .08);
   state[2] = state[3] = 0;
-  state[4] = 1e-2;
+  state[4]            = 1e-2;
 }
 static void uniform_motion(const double x[3], double inside, double state[NUM])
 {
@@ -95,7 +95,8 @@ static void gas_close(gas *g)
   for (int k = 0; k < NUM; k++) free(g->in[k]), free(g->out[k]);
 }
 
-static remap_status gas_move(gas *g, const remap_role role[NUM], int order, remap_limiter limiter, remap_field_report report[NUM])
+static remap_status gas_move(gas *g, const remap_role role[NUM], int order, remap_limiter limiter,
+                             remap_field_report report[NUM])
 {
   static const char *const name[NUM] = {"Density", "X", "Y", "Z", "Energy"};
   remap_field_desc         field[NUM];
@@ -115,7 +116,7 @@ static void check_states(gas *g, int order, remap_limiter limiter)
 {
   remap_field_report report[NUM];
   double             extreme[2] = {-1e30, -1e30}; /* of -u, u, in the source */
-  int64_t            bad = 0;
+  int64_t            bad        = 0;
 
   if (!rt_all(RT_EQ(gas_move(g, conserved, order, limiter, report), REMAP_OK))) return;
   for (int64_t c = 0; c < g->w.cells[0]; c++) {
@@ -140,8 +141,8 @@ static void a_jump_of_density_a_thousandfold_leaves_states_that_can_be(void)
   for (int kind = AV_HEXAHEDRA; kind <= AV_DUAL; kind++) {
     gas g;
 
-    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh((av_kind)kind, kind ? 20 : 15, -0.02), 3, shear, 1000,
-                 false))
+    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh((av_kind)kind, kind ? 20 : 15, -0.02), 3, shear,
+                 1000, false))
       for (int order = 1; order <= 3; order++)
         for (int limiter = REMAP_LIMITER_NONE; limiter <= (order > 1 ? REMAP_LIMITER_CAAS : REMAP_LIMITER_NONE); limiter++)
           check_states(&g, order, (remap_limiter)limiter);
@@ -207,7 +208,8 @@ static void smooth_flow_is_moved_to_the_second_order(void)
     gas       g;
     const int n = finer ? 16 : 8;
 
-    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, n, 0.02), av_mesh(AV_HEXAHEDRA, n + 1, -0.02), 0, smooth_flow, 1, true)) {
+    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, n, 0.02), av_mesh(AV_HEXAHEDRA, n + 1, -0.02), 0, smooth_flow, 1,
+                 true)) {
       RT_EQ(gas_move(&g, primitive, 2, REMAP_LIMITER_AUTO, NULL), REMAP_OK);
       for (int64_t c = 0; c < g.w.cells[1]; c++) {
         double want[NUM];
@@ -246,16 +248,18 @@ static void the_same_mesh_copies_primitive_variables(void)
 static void bits_of_systems_depend_neither_on_ranks_nor_numbering(void)
 {
   gas        alone, together;
-  const bool ready[2] = {
-      gas_open(&alone, MPI_COMM_SELF, av_mesh(AV_HEXAHEDRA, 10, 0.02), av_mesh(AV_TETRAHEDRA, 12, -0.02), 0, shear, 1000, false),
-      gas_open(&together, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 10, 0.02), av_mesh(AV_TETRAHEDRA, 12, -0.02), 3, shear, 1000, false)};
-  double *want = tm_alloc_(alone.w.cells[1], sizeof *want);
+  const bool ready[2] = {gas_open(&alone, MPI_COMM_SELF, av_mesh(AV_HEXAHEDRA, 10, 0.02), av_mesh(AV_TETRAHEDRA, 12, -0.02), 0,
+                                  shear, 1000, false),
+                         gas_open(&together, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 10, 0.02), av_mesh(AV_TETRAHEDRA, 12, -0.02),
+                                  3, shear, 1000, false)};
+  double    *want     = tm_alloc_(alone.w.cells[1], sizeof *want);
 
   for (int order = 2; order <= 3 && ready[0] && ready[1]; order++) {
     remap_field_report report[2][NUM];
 
     for (int k = 0; k < NUM; k++) /* means are sums in the order of numbers: the others take them from here */
-      for (int64_t c = 0; c < together.w.cells[0]; c++) together.in[k][c] = alone.in[k][together.w.mine[0]->view.cell_global[c]];
+      for (int64_t c = 0; c < together.w.cells[0]; c++)
+        together.in[k][c] = alone.in[k][together.w.mine[0]->view.cell_global[c]];
     RT_EQ(gas_move(&alone, conserved, order, order == 2 ? REMAP_LIMITER_NONE : REMAP_LIMITER_AUTO, report[0]), REMAP_OK);
     RT_EQ(gas_move(&together, conserved, order, order == 2 ? REMAP_LIMITER_NONE : REMAP_LIMITER_AUTO, report[1]), REMAP_OK);
     RT_CHECK(report[0][0].scaled_cells > 0);
@@ -285,14 +289,15 @@ static void mass_fractions_stay_within_bounds_and_add_up(void)
     gas     g;
     double *in[3], *out[3];
 
-    const bool ready = gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh(AV_TETRAHEDRA, 16, -0.02), 3, shear, 50, false);
+    const bool ready =
+        gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh(AV_TETRAHEDRA, 16, -0.02), 3, shear, 50, false);
     for (int k = 0; k < 3; k++) {
       in[k] = tm_alloc_(g.w.cells[0], sizeof(double)), out[k] = tm_alloc_(g.w.cells[1], sizeof(double));
       for (int64_t c = 0; c < g.w.cells[0]; c++) in[k][c] = share(g.centroid[0] + 3 * c, k) * (per_mass ? 1 : g.in[0][c]);
     }
     for (int order = 2; order <= 3 && ready; order++)
       for (int limiter = REMAP_LIMITER_NONE; limiter <= REMAP_LIMITER_AUTO; limiter++) {
-        remap_field_desc   field[4] = {{.name = "rho", .system = 4, .role = REMAP_ROLE_DENSITY, .in = g.in[0], .out = g.out[0]}};
+        remap_field_desc field[4] = {{.name = "rho", .system = 4, .role = REMAP_ROLE_DENSITY, .in = g.in[0], .out = g.out[0]}};
         remap_field_report report[4];
         remap_transfer     how;
 
@@ -330,7 +335,8 @@ static void vectors_are_turned(void)
   static const double turn[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
   gas                 g;
 
-  if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 6, 0.02), av_mesh(AV_HEXAHEDRA, 5, -0.02), 3, uniform_motion, 1, true)) {
+  if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 6, 0.02), av_mesh(AV_HEXAHEDRA, 5, -0.02), 3, uniform_motion, 1,
+               true)) {
     remap_field_desc field[7];
     remap_transfer   how;
     double          *v[2][3];
@@ -341,7 +347,8 @@ static void vectors_are_turned(void)
     }
     remap_transfer_default(&how);
     how.rotation = turn, how.gamma = gamma_of_air;
-    for (int k = 0; k < 4; k++) field[k] = (remap_field_desc){.system = 9, .role = primitive[k], .in = g.in[k], .out = g.out[k]};
+    for (int k = 0; k < 4; k++)
+      field[k] = (remap_field_desc){.system = 9, .role = primitive[k], .in = g.in[k], .out = g.out[k]};
     for (int k = 0; k < 3; k++) field[4 + k] = (remap_field_desc){.vector = 2, .in = v[0][k], .out = v[1][k]};
     RT_EQ(remap_field(g.w.ctx, REMAP_FORWARD, &how, 7, field, NULL), REMAP_OK);
     for (int64_t c = 0; c < g.w.cells[1]; c++) {
@@ -403,8 +410,8 @@ static void systems_that_make_no_sense_are_refused(void)
 static void second_moments_must_have_been_asked_for(void)
 {
   for (int k = 0; k < 2; k++) {
-    tm_mesh               *mesh  = tm_hexahedra((int[]){1, 1, 1}, NULL, NULL);
-    double                 in    = 1, out = 0;
+    tm_mesh               *mesh = tm_hexahedra((int[]){1, 1, 1}, NULL, NULL);
+    double                 in = 1, out = 0;
     const remap_field_desc field = {.name = "rho", .system = 1, .role = REMAP_ROLE_DENSITY, .in = &in, .out = &out};
     remap_context         *ctx   = NULL;
     remap_options          options;

@@ -112,7 +112,7 @@ typedef enum remap_role {
 
 /** Bounds on the reconstruction inside each giving cell. */
 typedef enum remap_limiter {
-  REMAP_LIMITER_NONE            = 0, /**< linear fields (order 3: quadratic ones) are reproduced exactly; may overshoot at jumps */
+  REMAP_LIMITER_NONE            = 0, /**< linear (order 3: quadratic) fields are reproduced exactly; may overshoot at jumps */
   REMAP_LIMITER_BARTH_JESPERSEN = 1, /**< no value beyond those of the vertex neighbours */
   REMAP_LIMITER_AUTO            = 2, /**< BARTH_JESPERSEN where the field is not smooth; smooth extrema and slopes towards walls
                                           stay, but no sign changes that the neighbours do not have */
@@ -208,20 +208,21 @@ typedef struct remap_transfer {
   double             fill_value;   /**< for REMAP_UNCOVERED_FILL; default NaN */
   double             gamma;        /**< ratio of specific heats of an ideal gas, above 1; default 0: unknown */
   double             gas_constant; /**< R of p = rho R T; default 0: unknown */
-  int                allow_nan;    /**< not 0: values that are no finite numbers pass, and spoil the cells they reach; default 0 */
-  const double      *rotation;     /**< [3][3] by rows, orthogonal: a vector v of the source is rotation v in the target (backward its
-                                        transpose is used); read when the transfer starts; default NULL: vectors stay as they are */
+  int                allow_nan;    /**< not 0: values that are no finite numbers pass, and spoil the cells they reach */
+  const double      *rotation;     /**< [3][3] by rows, orthogonal: a vector v of the source is rotation v in the target (backward
+                                        its transpose is used); read when the transfer starts; default NULL: none */
 } remap_transfer;
 
 /** One field of a call of remap_field.
  *
  *  Fields with the same number `system` > 0 form a system: a density and what moves with the mass. They are reconstructed as
- *  density, amounts per mass (velocity, others) about the centre of mass, and internal energy, so that velocity, pressure (if given:
- *  temperature) and amounts per mass stay uniform where they are; then, in the few giving cells where that is not enough, all slopes of the system are scaled down by one factor until every
- *  receiving cell has positive density, positive internal energy and amounts per mass within the bounds around its givers.
- *  Mass, momentum, total energy and other amounts are conserved. Velocity, pressure, temperature and MASS_SPECIFIC fields are
- *  converted, moved as amounts, and converted back; cells that are the same are copied. A transfer with a system of order 2 or 3 is
- *  collective. Its integrals are those of the amounts: of momentum for a velocity, of total energy for a pressure. */
+ *  density, amounts per mass (velocity, others) about the centre of mass, and internal energy, so that velocity, pressure (if
+ *  given: temperature) and amounts per mass stay uniform where they are; then, in the few giving cells where that is not enough,
+ *  all slopes of the system are scaled down by one factor until every receiving cell has a density and an internal energy above
+ *  0 and amounts per mass within the bounds around its givers. Mass, momentum, total energy and other amounts are conserved.
+ *  Velocity, pressure, temperature and MASS_SPECIFIC fields are converted, moved as amounts, and converted back; cells that are
+ *  the same are copied. A transfer with a system of order 2 or 3 is collective. Its integrals are those of the amounts: of
+ *  momentum for a velocity, of total energy for a pressure. */
 typedef struct remap_field_desc {
   const char   *name;    /**< used in messages; may be NULL */
   remap_nature  nature;
@@ -270,7 +271,8 @@ typedef struct remap_field_report {
   int64_t filled_cells;     /**< likewise, that got fill_value */
 } remap_field_report;
 
-/** What remap_build found, over all ranks; the same on every rank but for seconds_transfer. Volumes in the caller's unit cubed. */
+/** What remap_build found, over all ranks; the same on every rank but for seconds_transfer. Volumes in the caller's unit
+ *  cubed. */
 typedef struct remap_stats {
   int     ranks;
   int64_t cells[2];               /**< [side] */
@@ -305,7 +307,8 @@ typedef struct remap_pairs_view {
   const double  *volume;     /**< [same] V */
   const double  *moment;     /**< [same][3] integral of (x - c), c the centroid of the giving cell */
   const uint8_t *same;       /**< [same] 1: the two cells cover each other alone */
-  const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 and no systems */
+  const double  *second;     /**< [same][6] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if max_order < 3 and no
+                                  systems */
 } remap_pairs_view;
 
 /** A cell that is covered in part. */
@@ -419,14 +422,15 @@ REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *ma
 
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
  *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields, a
- *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS or a system, and one
- *  with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
+ *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS or a system,
+ *  and one with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
  *  exchanges messages with neighbours only and takes no memory: its status is the worst of this rank's own and of those
  *  neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes it one. Values below 1e-280 count
  *  as 0.
- *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value, a density in a system that is not positive), COVERAGE, NO_MEMORY, MPI_FAILURE. */
-REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
-                                   const remap_field_desc *fields, remap_field_report *reports);
+ *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value, a density in a system that is not
+ *  positive), COVERAGE, NO_MEMORY, MPI_FAILURE. */
+REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
+                                   int num_fields, const remap_field_desc *fields, remap_field_report *reports);
 
 /** remap_field in two halves, so that the caller's own work overlaps with the messages. The start reads values, checks them
  *  and sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes.
@@ -463,8 +467,8 @@ REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side,
  *  Errors: BAD_ORDER, BAD_ARGUMENT. */
 REMAP_API remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
 
-/** The cells of one side, over all ranks, that are covered in part and least of all: ascending by fraction. Collective; the same on
- *  every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in it. Masks
+/** The cells of one side, over all ranks, that are covered in part and least of all: ascending by fraction. Collective; the
+ *  same on every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in it. Masks
  *  count as in remap_coverage.
  *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, remap_partial_cell *cell);

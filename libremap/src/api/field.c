@@ -1,5 +1,5 @@
-/* field -- remap_field and its halves. What a transfer needs is prepared when it is first asked for, by all ranks together; after
- * that a transfer involves neighbours only and takes no memory. */
+/* field -- remap_field and its halves. What a transfer needs is prepared when it is first asked for, by all ranks together;
+ * after that a transfer involves neighbours only and takes no memory. */
 #include "api/context.h"
 
 #include <string.h>
@@ -20,7 +20,8 @@ static remap_status check_agreed(const remap_context *ctx, remap_direction direc
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "order %d is not within 1..%d, the context's max_order", how->order,
                    ctx->options.max_order);
   if (how->limiter < REMAP_LIMITER_NONE || how->limiter > REMAP_LIMITER_CAAS || how->on_uncovered < REMAP_UNCOVERED_KEEP ||
-      how->on_uncovered > REMAP_UNCOVERED_ERROR || how->on_partial < REMAP_PARTIAL_BLEND || how->on_partial > REMAP_PARTIAL_ERROR)
+      how->on_uncovered > REMAP_UNCOVERED_ERROR || how->on_partial < REMAP_PARTIAL_BLEND ||
+      how->on_partial > REMAP_PARTIAL_ERROR)
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "the limiter or a coverage policy is not one of its enum");
   if (num_fields < 0 || (num_fields > 0 && !fields))
     return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "num_fields is %d, fields is %s", num_fields, fields ? "given" : "NULL");
@@ -48,8 +49,8 @@ static bool is_missing(const void *all, const void *const *block, bool is_by_blo
 }
 
 /* What this rank alone passes. */
-static remap_status check_own(const remap_context *ctx, remap_direction direction, int num_fields, const remap_field_desc *fields,
-                              rm_reason *reason)
+static remap_status check_own(const remap_context *ctx, remap_direction direction, int num_fields,
+                              const remap_field_desc *fields, rm_reason *reason)
 {
   const remap_side giving = giver_of(direction);
 
@@ -69,10 +70,10 @@ static remap_status check_own(const remap_context *ctx, remap_direction directio
 /* A number that tells this transfer from others that ranks might mistake for it. */
 static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
 {
-  const int    words[8]  = {(int)direction,         how->order,  (int)how->limiter,    (int)how->on_uncovered,
-                            (int)how->on_partial, num_fields, how->allow_nan != 0, how->rotation != NULL};
-  const double gas[2]    = {how->gamma, how->gas_constant};
-  uint64_t     hash      = 0, bits[2];
+  const int    words[8] = {(int)direction,       how->order, (int)how->limiter,   (int)how->on_uncovered,
+                           (int)how->on_partial, num_fields, how->allow_nan != 0, how->rotation != NULL};
+  const double gas[2]   = {how->gamma, how->gas_constant};
+  uint64_t     hash     = 0, bits[2];
 
   memcpy(bits, gas, sizeof bits);
   for (int k = 0; k < 8; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
@@ -92,9 +93,10 @@ static remap_status check_marks(const remap_context *ctx, uint64_t mark, rm_reas
   int64_t extreme[2] = {(int64_t)(mark >> 2), -(int64_t)(mark >> 2)};
 
   RM_TRY(rm_comm_max_i64(&ctx->comm, extreme, 2));
-  return extreme[0] == -extreme[1] ? REMAP_OK
-                                   : rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1,
-                                             "direction, transfer, number, natures or old values of fields differ between ranks");
+  return extreme[0] == -extreme[1]
+             ? REMAP_OK
+             : rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1,
+                       "direction, transfer, number, natures or old values of fields differ between ranks");
 }
 
 /* The stencil among the cells that take part in a role; one of all cells serves both where nothing is masked. */
@@ -125,10 +127,10 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction,
                              .giving_rows       = &mapping->rows[giving],
                              .giving_stencil    = is_wide ? *wide_of(ctx, giving, true) : *stencil_of(ctx, giving, true),
                              .receiving_stencil = *stencil_of(ctx, receiving, false),
-                             .keeping_stencil   = is_wide ? *wide_of(ctx, receiving, false) : *stencil_of(ctx, receiving, false),
-                             .giving_second     = ctx->second[giving],
-                             .receiving_second  = ctx->second[receiving],
-                             .giving_measure    = ctx->measure[giving],
+                             .keeping_stencil  = is_wide ? *wide_of(ctx, receiving, false) : *stencil_of(ctx, receiving, false),
+                             .giving_second    = ctx->second[giving],
+                             .receiving_second = ctx->second[receiving],
+                             .giving_measure   = ctx->measure[giving],
                              .receiving_measure = ctx->measure[receiving],
                              .giving_layout     = ctx->layout[giving],
                              .receiving_layout  = ctx->layout[receiving],
@@ -157,8 +159,9 @@ static remap_status need_second(remap_context *ctx)
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     if (ctx->second[side]) continue;
     if (!ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
-    status = !ctx->stencil_arena[side] ? REMAP_NO_MEMORY
-                                       : rm_mesh_second(ctx->stencil_arena[side], ctx->mesh[side], ctx->options.faces, &ctx->second[side]);
+    status = !ctx->stencil_arena[side]
+                 ? REMAP_NO_MEMORY
+                 : rm_mesh_second(ctx->stencil_arena[side], ctx->mesh[side], ctx->options.faces, &ctx->second[side]);
   }
   return rm_comm_agree(&ctx->comm, status, NULL);
 }
@@ -211,7 +214,7 @@ static remap_status start(remap_context *ctx, remap_direction direction, const r
   const rm_transfer_setup setup = setup_of(ctx, direction, false);
   const rm_load           load  = rm_load_of(&setup, how, num_fields, fields);
   const uint64_t          mark  = mark_of(direction, how, num_fields, fields);
-  mine = check_own(ctx, direction, num_fields, fields, reason);
+  mine                          = check_own(ctx, direction, num_fields, fields, reason);
   if (!ctx->carrier[direction] || !rm_load_covers(ctx->load[direction], load)) {
     RM_TRY(rm_comm_agree_reason(&ctx->comm, mine, reason));
     RM_TRY(check_marks(ctx, mark, reason));
@@ -248,8 +251,8 @@ remap_status remap_field_finish(remap_context *ctx, remap_direction direction, r
   RM_REQUIRE(ctx && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
   if (!rm_carrier_is_under_way(ctx->carrier[direction])) {
-    status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1,
-                     "no transfer in this direction is under way: remap_field_start comes first");
+    status =
+        rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "no transfer in this direction is under way: remap_field_start comes first");
   } else {
     const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
 

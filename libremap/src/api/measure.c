@@ -14,12 +14,13 @@ static remap_status find_factors(rm_arena *arena, const rm_mesh *mesh, const dou
     const double own = fabs(mesh->cell_volume[c]) * cubed;
 
     if (given && !(given[c] > 0.0 && isfinite(given[c])))
-      return rm_fail(REMAP_BAD_MESH, reason, mesh->side, mesh->cell_global[c], "cell_volume is %g: give a volume above 0, or none",
-                     given[c]);
+      return rm_fail(REMAP_BAD_MESH, reason, mesh->side, mesh->cell_global[c],
+                     "cell_volume is %g: give a volume above 0, or none", given[c]);
     factor[c] = given && own > 0.0 ? given[c] / own : 1.0;
     if (!(factor[c] > 0x1p-100 && factor[c] < 0x1p100))
       return rm_fail(REMAP_BAD_MESH, reason, mesh->side, mesh->cell_global[c],
-                     "cell_volume is %g, but the cell has %g: give volumes in the unit of the coordinates", given ? given[c] : 1.0, own);
+                     "cell_volume is %g, but the cell has %g: give volumes in the unit of the coordinates",
+                     given ? given[c] : 1.0, own);
   }
   *out = factor;
   return REMAP_OK;
@@ -28,7 +29,7 @@ static remap_status find_factors(rm_arena *arena, const rm_mesh *mesh, const dou
 /* What statistics say of them. Collective. */
 static remap_status summarise(remap_context *ctx, int side, double cubed)
 {
-  const rm_mesh *mesh = ctx->mesh[side];
+  const rm_mesh *mesh  = ctx->mesh[side];
   double         worst = 0.0, all;
   int64_t        cell  = INT64_MIN; /* negated, so that the smallest wins */
   rm_sum         sum;
@@ -53,7 +54,7 @@ static remap_status summarise(remap_context *ctx, int side, double cubed)
 remap_status rm_context_measure(remap_context *ctx, int side, const remap_mesh *given, rm_reason *reason)
 {
   const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
-  int64_t      any  = given->cell_volume != NULL;
+  int64_t      any = given->cell_volume != NULL;
   remap_status status;
 
   ctx->measure[side] = NULL;

@@ -1,12 +1,12 @@
-/* admit -- slopes of systems are scaled until every receiving cell's state can be: density and internal energy stay positive, amounts
- * per mass within the bounds around the givers.
+/* admit -- slopes of systems are scaled until every receiving cell's state can be: density and internal energy stay positive,
+ * amounts per mass within the bounds around the givers.
  *
  * Such states form a convex cone in mass, momentum, total energy and amounts (internal energy is a concave function of them, of
- * degree 1). So a giving cell whose every pair has content in the cone can do no harm; without slopes it is so. Whoever gives to
- * a receiving cell whose sum is not in the cone is scaled by the greatest factor that brings all its pairs into it; that changes what
- * its other receivers get, so the rounds go on until nothing is refused. A cell is scaled once, hence they end; a round is two
- * exchanges with neighbours and a reduction. Content stays, since a factor of all slopes of a cell keeps its mean, and what is
- * uniform per mass, since it is the same factor for all. O(pairs) per round and system. */
+ * degree 1). So a giving cell whose every pair has content in the cone can do no harm; without slopes it is so. Whoever gives
+ * to a receiving cell whose sum is not in the cone is scaled by the greatest factor that brings all its pairs into it; that
+ * changes what its other receivers get, so the rounds go on until nothing is refused. A cell is scaled once, hence they end; a
+ * round is two exchanges with neighbours and a reduction. Content stays, since a factor of all slopes of a cell keeps its mean,
+ * and what is uniform per mass, since it is the same factor for all. O(pairs) per round and system. */
 #include "field_private.h"
 
 static const double LEAST_PART    = 0.1;     /* of the least density and internal energy around                */
@@ -38,8 +38,8 @@ static bool is_bounded(const rm_packing *p, int f, int s)
   return p->system_of[f] == s && f != p->system[s].density && f != p->system[s].energy;
 }
 
-/* A part of the least internal energy around: in a volume and per mass, of which one is 0. None if neither is above 0: then what is
- * given is not positive itself. */
+/* A part of the least internal energy around: in a volume and per mass, of which one is 0. None if neither is above 0: then
+ * what is given is not positive itself. */
 typedef struct lowest {
   double fixed, per_mass;
 } lowest;
@@ -80,7 +80,7 @@ static double excess_at(const excess *x, double t) { return (x->a * t + x->b) * 
 static double keep_excess(const excess *x, double most)
 {
   const double root = sqrt(fmax(x->b * x->b - 4.0 * x->a * x->c, 0.0)), q = -0.5 * (x->b + (x->b < 0.0 ? -root : root));
-  double       t    = most;
+  double       t = most;
 
   if (excess_at(x, most) >= 0.0 || !(x->c > 0.0)) return x->c > 0.0 ? most : 0.0;
   if (q / x->a > 0.0) t = fmin(t, q / x->a);
@@ -97,13 +97,13 @@ static double keep_below(double base, double rise, double room, double most)
   return base < room ? fmin(most, (room - base) / rise) : 0.0;
 }
 
-double rm_admit_factor(const rm_packing *p, int system, const double *content, const double *change, double volume, rm_limits limits,
-                       double slack)
+double rm_admit_factor(const rm_packing *p, int system, const double *content, const double *change, double volume,
+                       rm_limits limits, double slack)
 {
   const rm_system *s = &p->system[system];
   const double     r = content[s->density], dr = change[s->density];
-  const lowest floor = floor_of(p, system, volume, limits, LEAST_PART);
-  double           t = 1.0;
+  const lowest     floor = floor_of(p, system, volume, limits, LEAST_PART);
+  double           t     = 1.0;
 
   if (!(volume > 0.0)) return 0.0;
   t = keep_below(-r, -dr, -LEAST_PART * RM_VALUE_SCALE * limits.least[s->density] * volume, t);
@@ -127,7 +127,7 @@ static bool admits(const rm_packing *p, int system, const double *content, doubl
 {
   const rm_system *s = &p->system[system];
   const double     r = content[s->density], part = LEAST_PART * (1.0 - 0x1p-20);
-  const lowest floor = floor_of(p, system, volume, limits, part);
+  const lowest     floor = floor_of(p, system, volume, limits, part);
 
   if (r < part * RM_VALUE_SCALE * limits.least[s->density] * volume) return false;
   for (int f = 0; f < p->num_fields; f++) {
@@ -153,9 +153,10 @@ remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, 
   return REMAP_OK;
 }
 
-/* Add what a giver's polynomials hold in a piece of space with these moments about its centroid: amounts, and what slopes add. */
-static void add_content(const rm_packing *p, int s, const double *place, double volume, const double m[3], const double second[6],
-                        double *content, double *change)
+/* Add what a giver's polynomials hold in a piece of space with these moments about its centroid: amounts, and what slopes add.
+ */
+static void add_content(const rm_packing *p, int s, const double *place, double volume, const double m[3],
+                        const double second[6], double *content, double *change)
 {
   for (int f = 0; f < p->num_fields; f++) {
     const double *at = place + p->at[f], *g = at + RM_PACK_SLOPE, *h = at + rm_pack_curvature(p->has_bounds);
@@ -172,12 +173,13 @@ static bool has_slopes(const rm_packing *p, int s) { return p->degree[p->system[
 static bool refuses(const rm_admission *w, const rm_rows *rows, const rm_packing *p, int s, rm_lid cell, const double *got,
                     rm_limits limits)
 {
-  const int num    = p->num_fields;
+  const int num     = p->num_fields;
   double   *content = w->room + 2 * num, *change = w->room + 3 * num;
 
   for (int f = 0; f < num; f++) content[f] = change[f] = 0.0;
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++)
-    add_content(p, s, got + (int64_t)rows->giver[k] * p->width, rows->volume[k], rows->moment[k], rows->second[k], content, change);
+    add_content(p, s, got + (int64_t)rows->giver[k] * p->width, rows->volume[k], rows->moment[k], rows->second[k], content,
+                change);
   for (int f = 0; f < num; f++) content[f] += change[f];
   return !admits(p, s, content, rm_row_volume(rows, cell), limits);
 }
@@ -205,9 +207,9 @@ static void refuse(rm_admission *w, const rm_transfer_setup *setup, const rm_pac
 static double factor_of(const rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, int s, rm_lid cell,
                         const double *place)
 {
-  const rm_rows  *rows   = setup->giving_rows;
-  const int       num    = p->num_fields;
-  const rm_limits limits = {w->room, w->room + num};
+  const rm_rows  *rows    = setup->giving_rows;
+  const int       num     = p->num_fields;
+  const rm_limits limits  = {w->room, w->room + num};
   double         *content = w->room + 2 * num, *change = w->room + 3 * num, factor = 1.0;
 
   rm_limits_clear(p, limits);
@@ -252,7 +254,7 @@ static bool scale_refused(rm_admission *w, const rm_transfer_setup *setup, const
         is_hit |= refused[(int64_t)rows->giver[k] * n + s] != 0;
       if (!is_hit) continue;
       w->is_scaled[(int64_t)c * n + s] = 1;
-      *factor = factor_of(w, setup, p, s, c, pack + (int64_t)c * p->width);
+      *factor                          = factor_of(w, setup, p, s, c, pack + (int64_t)c * p->width);
       scale(p, s, *factor, pack + (int64_t)c * p->width);
       any |= *factor < 1.0;
     }
@@ -260,7 +262,8 @@ static bool scale_refused(rm_admission *w, const rm_transfer_setup *setup, const
 }
 
 /* One round. True if some slope was scaled on some rank. Collective. */
-static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got, rm_word *word)
+static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got,
+                      rm_word *word)
 {
   const size_t n   = (size_t)p->num_systems;
   int64_t      any = 0;
@@ -280,7 +283,8 @@ static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_
   return any != 0;
 }
 
-void rm_admission_run(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got, rm_word *word)
+void rm_admission_run(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got,
+                      rm_word *word)
 {
   for (int64_t k = 0; k < (int64_t)setup->receiving->num_cells * p->num_systems; k++) w->refused[k] = 0;
   for (int64_t k = 0; k < (int64_t)setup->giving->num_cells * p->num_systems; k++) w->is_scaled[k] = 0;

@@ -1,7 +1,7 @@
 /* caas -- clip and assured sum: receiving values are clipped to the bounds of the givers' neighbourhoods, and what that adds or
- * takes is given back in proportion to the room that every value has left. Content is kept to rounding, and bounds hold, whatever
- * the reconstruction was; the price is a sum over all ranks, exact and therefore the same on any number of them, and that a part of
- * each clipping is spread over the whole mesh. O(pairs) per field. */
+ * takes is given back in proportion to the room that every value has left. Content is kept to rounding, and bounds hold,
+ * whatever the reconstruction was; the price is a sum over all ranks, exact and therefore the same on any number of them, and
+ * that a part of each clipping is spread over the whole mesh. O(pairs) per field. */
 #include "field_private.h"
 
 /* Bounds of a cell that takes part, scaled; false for cells that do not: copies, cells without volume, and partial ones whose
@@ -12,7 +12,8 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   const uint8_t  cover         = rows->cover[cell];
   const int64_t  place_in_pack = (int64_t)cell * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;
 
-  if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]]) return false;
+  if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]])
+    return false;
   if (!(w->setup->receiving->cell_volume[cell] > 0.0)) return false;
   bounds[0] = INFINITY;
   bounds[1] = -INFINITY;

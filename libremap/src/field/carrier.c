@@ -1,36 +1,36 @@
 /* carrier -- fields from giving to receiving cells, in two steps.
  *
- *   start    values are gathered, checked and converted; those of the stencil's halo travel (order 2), or all that is given (order 1)
- *   finish   reconstruction of the giving cells, with its own messages (profile); what is given travels; slopes of systems are scaled
- *            (admit); cells receive; for CAAS, a sum over all ranks; uncovered cells take the nearest value, where there are any;
- *            exact integrals, where somebody wants them; values are written
+ *   start    values are gathered, checked and converted; those of the stencil's halo travel (order 2), or all that is given
+ * (order 1) finish   reconstruction of the giving cells, with its own messages (profile); what is given travels; slopes of
+ * systems are scaled (admit); cells receive; for CAAS, a sum over all ranks; uncovered cells take the nearest value, where
+ * there are any; exact integrals, where somebody wants them; values are written
  *
- * Every message carries its sender's status, so a failure reaches all who depend on it, in the exchange that follows. The caller's
- * arrays are written at the very end, when nothing can fail any more. O(pairs) time per field; 16 bytes per receiving cell (24 for
- * CAAS) and what profile takes per giving cell for each field. */
+ * Every message carries its sender's status, so a failure reaches all who depend on it, in the exchange that follows. The
+ * caller's arrays are written at the very end, when nothing can fail any more. O(pairs) time per field; 16 bytes per receiving
+ * cell (24 for CAAS) and what profile takes per giving cell for each field. */
 #include "field_private.h"
 
 #include <string.h>
 
 struct rm_carrier {
   rm_transfer_setup setup;
-  rm_load           load;       /* the most it can carry                                       */
-  rm_profile        giving;     /* of the giving cells                                         */
-  rm_profile        keeping;    /* of old content that receiving cells keep, if they blend it  */
+  rm_load           load;               /* the most it can carry                                       */
+  rm_profile        giving;             /* of the giving cells                                         */
+  rm_profile        keeping;            /* of old content that receiving cells keep, if they blend it  */
   double           *kept, *kept_number; /* [receiving cells][num_fields] likewise               */
-  double           *given;      /* [giving cells][num_fields] as the caller gave them            */
-  double           *number;     /* [giving cells][num_fields] what is reconstructed; given itself without systems */
-  double           *old;        /* [receiving cells][num_fields] values before, if CAAS needs them */
-  rm_sum           *sum;        /* [num_fields][3] of CAAS                                      */
-  rm_flow           given_flow; /* what giving cells give                                       */
-  rm_admission      admission;  /* of systems with slopes                                       */
-  rm_flow           taken;      /* values that uncovered cells take                             */
-  const rm_nearest *nearest;    /* NULL: nobody takes any                                       */
-  double           *value;      /* [receiving cells][num_fields] old values, then new ones      */
-  double           *room;       /* [6][num_fields]                                              */
-  rm_integral      *integral;   /* [num_fields]                                                 */
-  double           *extreme;    /* [4][num_fields] least, least, greatest, greatest              */
-  int64_t          *count;      /* [num_fields][NUM_COUNTS] for reports                         */
+  double           *given;              /* [giving cells][num_fields] as the caller gave them            */
+  double           *number;             /* [giving cells][num_fields] what is reconstructed; given itself without systems */
+  double           *old;                /* [receiving cells][num_fields] values before, if CAAS needs them */
+  rm_sum           *sum;                /* [num_fields][3] of CAAS                                      */
+  rm_flow           given_flow;         /* what giving cells give                                       */
+  rm_admission      admission;          /* of systems with slopes                                       */
+  rm_flow           taken;              /* values that uncovered cells take                             */
+  const rm_nearest *nearest;            /* NULL: nobody takes any                                       */
+  double           *value;              /* [receiving cells][num_fields] old values, then new ones      */
+  double           *room;               /* [6][num_fields]                                              */
+  rm_integral      *integral;           /* [num_fields]                                                 */
+  double           *extreme;            /* [4][num_fields] least, least, greatest, greatest              */
+  int64_t          *count;              /* [num_fields][NUM_COUNTS] for reports                         */
 
   /* of the transfer under way: */
   bool              is_under_way;
@@ -87,8 +87,8 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->count, arena, NUM_COUNTS * (int64_t)n);
   RM_NEW(c->fields, arena, n);
-  c->giving.ground = (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure,
-                                  false};
+  c->giving.ground =
+      (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure, false};
   c->giving.given  = c->given;
   c->giving.number = c->number;
   RM_TRY(rm_profile_init(arena, &c->load, &c->giving));
@@ -102,7 +102,8 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   return rm_flow_init(arena, setup->rows->plan, (size_t)c->load.width * sizeof(double), &c->given_flow);
 }
 
-remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out, rm_reason *reason)
+remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out,
+                              rm_reason *reason)
 {
   const rm_comm *comm = setup->comm;
   rm_carrier    *c    = rm_arena_zero(arena, 1, sizeof *c);
@@ -336,7 +337,7 @@ static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report 
   RM_TRY(rm_integral_report(scratch, setup, n, c->integral, reports));
   for (int f = 0; f < n; f++) {
     const double  *low = least + 2 * f, *high = greatest + 2 * f;
-    const int64_t *count = c->count + (int64_t)f * NUM_COUNTS;
+    const int64_t *count     = c->count + (int64_t)f * NUM_COUNTS;
     const bool     is_spoilt = count[SPOILT] > 0; /* what has values that are no numbers has no integrals */
 
     reports[f] = (remap_field_report){.order               = c->packing.order[f],
@@ -395,5 +396,6 @@ remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *
     return REMAP_OK;
   }
   *reason = c->word.reason;
-  return c->word.mine == REMAP_OK ? rm_fail(status, reason, -1, -1, "a neighbouring rank failed: its message says why") : status;
+  return c->word.mine == REMAP_OK ? rm_fail(status, reason, -1, -1, "a neighbouring rank failed: its message says why")
+                                  : status;
 }

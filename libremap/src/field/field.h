@@ -12,22 +12,22 @@
  *   the neighbours' centroids span space; a direction they do not span has slope 0 (QR with column scaling and pivoting). */
 typedef struct rm_stencil {
   rm_lid         num_cells;
-  const int64_t *offset;            /* [num_cells + 1]                                                       */
-  const rm_lid  *neighbour;         /* [offset[num_cells]] < num_cells: own cell; else halo num_cells + k    */
-  const double (*weight)[3];        /* [offset[num_cells]]                                                   */
-  const int64_t *node_offset;       /* [num_cells + 1] the cell's nodes, for bounds                          */
-  const rm_lid  *node;              /* [node_offset[num_cells]] of the mesh                                  */
+  const int64_t *offset;      /* [num_cells + 1]                                                       */
+  const rm_lid  *neighbour;   /* [offset[num_cells]] < num_cells: own cell; else halo num_cells + k    */
+  const double (*weight)[3];  /* [offset[num_cells]]                                                   */
+  const int64_t *node_offset; /* [num_cells + 1] the cell's nodes, for bounds                          */
+  const rm_lid  *node;        /* [node_offset[num_cells]] of the mesh                                  */
   rm_lid         num_halo;
   const double (*halo_centroid)[3]; /* [num_halo]                                                            */
   const rm_plan *plan;              /* brings the halo's values: received item k is halo cell k              */
 
   /* Of a widened stencil, else NULL: least squares for quadratic polynomials g.y + sum of h (y y^T - spread), y = x - c, with
    * zero mean over the cell; coefficients are sums of weight (u_neighbour - u_cell), exact for quadratic fields. */
-  const int64_t *wide_offset;       /* [num_cells + 1]                                                       */
-  const rm_lid  *wide_neighbour;    /* [wide_offset[num_cells]] canonical order; vertex neighbours and, if they do not do, theirs */
-  const double (*wide_weight)[9];   /* [same] of g, then of h: xx, yy, zz, xy, xz, yz                         */
-  const double (*spread)[6];        /* [num_cells] mean of (x - c)(x - c)^T                                  */
-  const uint8_t *is_reduced;        /* [num_cells] 1: no polynomial is determined well: order 2 there        */
+  const int64_t *wide_offset;   /* [num_cells + 1]                                                       */
+  const rm_lid *wide_neighbour; /* [wide_offset[num_cells]] canonical order; vertex neighbours and, if they do not do, theirs */
+  const double (*wide_weight)[9]; /* [same] of g, then of h: xx, yy, zz, xy, xz, yz                         */
+  const double (*spread)[6];      /* [num_cells] mean of (x - c)(x - c)^T                                  */
+  const uint8_t *is_reduced;      /* [num_cells] 1: no polynomial is determined well: order 2 there        */
 } rm_stencil;
 
 /* takes_part [num_cells]: 0 for cells that are nobody's neighbour; NULL: all are. Collective. Lives in arena. */
@@ -41,8 +41,8 @@ typedef struct rm_layout {
   const int64_t *place;        /* [num_cells] place in its array, NULL: the number within what the array is of  */
 } rm_layout;
 
-/* A stencil for order 3 as well: near with more neighbours, hence with a halo and a plan of its own; it shares arrays with near.
- * second: rm_mesh_second of the mesh. Collective. Lives in arena. */
+/* A stencil for order 3 as well: near with more neighbours, hence with a halo and a plan of its own; it shares arrays with
+ * near. second: rm_mesh_second of the mesh. Collective. Lives in arena. */
 remap_status rm_stencil_widen(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
                               const double (*second)[6], const rm_stencil *near, const rm_stencil **out);
 
@@ -51,16 +51,16 @@ typedef struct rm_transfer_setup {
   const rm_comm    *comm;
   const rm_frame   *frame;
   const rm_mesh    *giving, *receiving;
-  const rm_rows    *rows;           /* of the receiving cells                                        */
-  const rm_rows    *giving_rows;    /* of the giving cells: their pairs and coverage, for integrals  */
-  const rm_stencil *giving_stencil; /* NULL if order 1; widened if order 3                           */
+  const rm_rows    *rows;              /* of the receiving cells                                        */
+  const rm_rows    *giving_rows;       /* of the giving cells: their pairs and coverage, for integrals  */
+  const rm_stencil *giving_stencil;    /* NULL if order 1; widened if order 3                           */
   const rm_stencil *receiving_stencil; /* for nearest by layers; NULL if nobody looks for the nearest */
   const rm_stencil *keeping_stencil; /* of receiving cells that keep old content outside; NULL if order 1; widened if order 3 */
   rm_layout         giving_layout, receiving_layout;
-  const double    (*giving_second)[6];    /* rm_mesh_second; NULL unless systems have slopes              */
-  const double    (*receiving_second)[6]; /* likewise; NULL unless such slopes, or order 3, go beyond what is covered */
-  const double     *giving_measure, *receiving_measure; /* [cells] the solver's volumes over those of the mesh; NULL: 1   */
-  bool              any_partial, any_uncovered; /* such receiving cells exist on some rank           */
+  const double (*giving_second)[6];    /* rm_mesh_second; NULL unless systems have slopes              */
+  const double (*receiving_second)[6]; /* likewise; NULL unless such slopes, or order 3, go beyond what is covered */
+  const double *giving_measure, *receiving_measure; /* [cells] the solver's volumes over those of the mesh; NULL: 1   */
+  bool          any_partial, any_uncovered;         /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 
 /* Are roles, vectors and the gas model such that fields can be moved together? BAD_ARGUMENT with the reason. Not collective. */
@@ -69,7 +69,7 @@ remap_status rm_systems_check(const remap_transfer *how, int num_fields, const r
 /* How much a transfer asks of a carrier; the same on every rank. */
 typedef struct rm_load {
   int  num_fields;
-  int  width;       /* doubles that travel per giving cell           */
+  int  width; /* doubles that travel per giving cell           */
   int  num_systems;
   bool has_slopes;  /* needs the stencil's halo                       */
   bool is_settled;  /* limiter CAAS: old values and sums are kept     */
@@ -84,7 +84,7 @@ typedef struct rm_load {
 rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
 /* A load that covers both, and whether the first covers the second. */
 rm_load rm_load_max(rm_load a, rm_load b);
-bool rm_load_covers(rm_load a, rm_load b);
+bool    rm_load_covers(rm_load a, rm_load b);
 
 /* carrier -- takes fields from the giving to the receiving cells, again and again, without taking memory and among neighbours
  * only. It holds buffers and what is under way, but nothing that changes a result: results depend neither on partition nor on
@@ -93,19 +93,20 @@ typedef struct rm_carrier rm_carrier;
 
 /* A carrier for transfers up to a load. Collective. Lives in arena; setup is copied, what it points to is borrowed. COVERAGE if
  * cells look for the nearest mapped cell and there is none. */
-remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out, rm_reason *reason);
+remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out,
+                              rm_reason *reason);
 
 /* Read values, check them and send what neighbours wait for. All ranks start, but none waits. mark tells this transfer from
- * others. A failure here is kept: rm_carrier_finish hands it out, once neighbours know; so is one that the caller comes with, mine
- * and its reason: then no value is read. The load fits; none is under way. how and fields are copied; of the arrays, only `out` is
- * borrowed until the finish, which writes it. */
-void rm_carrier_start(rm_carrier *carrier, const remap_transfer *how, int num_fields, const remap_field_desc *fields, uint64_t mark,
-                      remap_status mine, const rm_reason *reason);
+ * others. A failure here is kept: rm_carrier_finish hands it out, once neighbours know; so is one that the caller comes with,
+ * mine and its reason: then no value is read. The load fits; none is under way. how and fields are copied; of the arrays, only
+ * `out` is borrowed until the finish, which writes it. */
+void rm_carrier_start(rm_carrier *carrier, const remap_transfer *how, int num_fields, const remap_field_desc *fields,
+                      uint64_t mark, remap_status mine, const rm_reason *reason);
 
 /* Complete what was started. All ranks finish; each waits for its neighbours only, and its status is the worst of its own and
- * of those whose values it uses. With reports, [num_fields] on every rank or NULL on every rank, it is collective and the status
- * the same everywhere. Fields are written if the status is OK. cubed: the caller's unit of volume in that of the own frame, for
- * the integrals of the reports. */
+ * of those whose values it uses. With reports, [num_fields] on every rank or NULL on every rank, it is collective and the
+ * status the same everywhere. Fields are written if the status is OK. cubed: the caller's unit of volume in that of the own
+ * frame, for the integrals of the reports. */
 remap_status rm_carrier_finish(rm_carrier *carrier, double cubed, remap_field_report *reports, rm_reason *reason);
 
 /* Is a transfer under way? carrier may be NULL here and below. */

@@ -26,7 +26,8 @@ typedef struct rm_distance_noise {
  * Not collective. O(n). */
 void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3]);
 
-/* Axes W such that the products W d are orthonormal as columns; their number, the dimension of what the distances span. d is used up; scratch is [n]. Not collective. O(n). */
+/* Axes W such that the products W d are orthonormal as columns; their number, the dimension of what the distances span. d is
+ * used up; scratch is [n]. Not collective. O(n). */
 int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double axes[3][3]);
 
 /* ---- quadratic ------------------------------------------------------------------------------------------------- */
@@ -36,8 +37,9 @@ typedef struct rm_quadratic_room {
   double (*distance)[3], (*row)[9], *row_weight;
 } rm_quadratic_room;
 
-/* Weights of the nine coefficients of a quadratic polynomial with zero mean over a cell, from distances d_k between n centroids and
- * the cell's own and differences of mean (x - c)(x - c)^T. False if the neighbours do not determine it well. Not collective. O(n). */
+/* Weights of the nine coefficients of a quadratic polynomial with zero mean over a cell, from distances d_k between n centroids
+ * and the cell's own and differences of mean (x - c)(x - c)^T. False if the neighbours do not determine it well. Not
+ * collective. O(n). */
 bool rm_quadratic_weights(int64_t n, const double (*d)[3], const double (*spread)[6], const rm_distance_noise *noise,
                           rm_quadratic_room *room, double (*weight)[9]);
 
@@ -50,11 +52,11 @@ static const int rm_row_of[6] = {0, 1, 2, 0, 0, 1}, rm_column_of[6] = {0, 1, 2, 
  * stay finite. It changes no digit of what is not below 1e-280. */
 #define RM_VALUE_SCALE 0x1p-64
 
-/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it, of a field in
- * a system the amount per volume (at order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own
- * alone, whose value is copied as given); where the field has slopes, three slopes of the scaled value, then, if asked for, least
- * and greatest value around, scaled (of a field in a system: of the amount per mass); where it has curvature six coefficients h of
- * the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
+/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it, of a field
+ * in a system the amount per volume (at order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of
+ * its own alone, whose value is copied as given); where the field has slopes, three slopes of the scaled value, then, if asked
+ * for, least and greatest value around, scaled (of a field in a system: of the amount per mass); where it has curvature six
+ * coefficients h of the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
 
 /* Fields that are moved together, by number; -1: there is none. */
 typedef struct rm_system {
@@ -64,16 +66,16 @@ typedef struct rm_system {
 typedef struct rm_packing {
   const remap_transfer   *how;
   const remap_field_desc *fields;
-  int        num_fields, width;
-  int       *at;         /* [num_fields]                                              */
-  int       *order;      /* [num_fields] 1, 2 or 3: of what is reconstructed          */
-  int       *degree;     /* [num_fields] 0, 1 or 2: of the polynomials that travel    */
-  int       *system_of;  /* [num_fields] number in the list, -1: none                 */
-  int        num_systems;
-  rm_system *system;     /* [num_systems]                                             */
-  bool       has_bounds; /* fields of order 2 or 3 carry the bounds                   */
-  bool       is_limited; /* Barth-Jespersen                                           */
-  bool       is_checked; /* but not in cells that are smooth                          */
+  int                     num_fields, width;
+  int                    *at;        /* [num_fields]                                              */
+  int                    *order;     /* [num_fields] 1, 2 or 3: of what is reconstructed          */
+  int                    *degree;    /* [num_fields] 0, 1 or 2: of the polynomials that travel    */
+  int                    *system_of; /* [num_fields] number in the list, -1: none                 */
+  int                     num_systems;
+  rm_system              *system;     /* [num_systems]                                             */
+  bool                    has_bounds; /* fields of order 2 or 3 carry the bounds                   */
+  bool                    is_limited; /* Barth-Jespersen                                           */
+  bool                    is_checked; /* but not in cells that are smooth                          */
 } rm_packing;
 enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
 
@@ -167,10 +169,10 @@ bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u
 typedef struct rm_ground {
   const rm_mesh    *mesh;
   const rm_stencil *stencil;
-  const rm_rows    *rows;        /* of its cells                                                               */
-  const double    (*second)[6];  /* rm_mesh_second; NULL unless systems have slopes                            */
-  const double     *measure;     /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
-  bool              is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
+  const rm_rows    *rows;    /* of its cells                                                               */
+  const double (*second)[6]; /* rm_mesh_second; NULL unless systems have slopes                            */
+  const double *measure;     /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
+  bool          is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
 } rm_ground;
 
 typedef struct rm_profile rm_profile;
@@ -198,8 +200,8 @@ bool rm_is_smooth(const rm_stencil *stencil, rm_lid cell, const rm_around *rough
 
 /* What is known of how a transfer goes. */
 typedef struct rm_word {
-  rm_note      note;   /* worst status so far                  */
-  remap_status mine;   /* the same without what neighbours told */
+  rm_note      note; /* worst status so far                  */
+  remap_status mine; /* the same without what neighbours told */
   rm_reason    reason;
 } rm_word;
 
@@ -214,10 +216,10 @@ static inline const double *rm_flow_numbers(const rm_flow *flow) { return (const
 
 /* profile -- the fields of one mesh reconstructed, again and again. It owns flows and room; values are the carrier's. */
 struct rm_profile {
-  rm_ground     ground;
-  rm_flow       halo;           /* numbers around the stencils                                    */
-  rm_flow       slopes, roughs; /* likewise slopes and roughness, if smooth cells are told from others */
-  double      (*slope)[3];      /* [cells][num_fields]                                            */
+  rm_ground ground;
+  rm_flow   halo;               /* numbers around the stencils                                    */
+  rm_flow   slopes, roughs;     /* likewise slopes and roughness, if smooth cells are told from others */
+  double (*slope)[3];           /* [cells][num_fields]                                            */
   double       *rough, *spread; /* [cells][num_fields] cells that are rough, and their neighbours too */
   uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
   const double *given;          /* [cells][num_fields] values as the caller has them              */
@@ -243,15 +245,16 @@ void rm_profile_abandon(rm_profile *profile, const rm_comm *comm, rm_word *word)
 void rm_systems_find(rm_packing *packing);
 
 /* Of one cell, [num_fields] each: what is reconstructed, from what is given (may be the same array); the amount per volume of a
- * field, from both; what is given, from amounts per volume, in place. Fields outside of systems stay as they are. False if a density
- * is not positive; *bad is its field then. Is the internal energy of a system reconstructed per mass, not per volume? */
+ * field, from both; what is given, from amounts per volume, in place. Fields outside of systems stay as they are. False if a
+ * density is not positive; *bad is its field then. Is the internal energy of a system reconstructed per mass, not per volume?
+ */
 bool   rm_system_is_energy_per_mass(const rm_packing *packing, int s);
 bool   rm_system_numbers(const rm_packing *packing, const double *given, double *number, int *bad);
 double rm_system_amount(const rm_packing *packing, int f, const double *given, const double *number);
 void   rm_system_restore(const rm_packing *packing, double *value);
 
-/* The polynomials of a system's amounts per volume, of degree 2, from those of density and amounts per mass. place is the cell's in
- * the pack; second and volume are the cell's moments. The mean over the cell stays its amount. */
+/* The polynomials of a system's amounts per volume, of degree 2, from those of density and amounts per mass. place is the
+ * cell's in the pack; second and volume are the cell's moments. The mean over the cell stays its amount. */
 void rm_system_combine(const rm_packing *packing, int s, const double *given, const double *number, const double second[6],
                        double volume, const double centroid_error[3], double *place);
 
@@ -266,26 +269,26 @@ typedef struct rm_limits {
 void rm_limits_clear(const rm_packing *packing, rm_limits limits);
 void rm_limits_add(const rm_packing *packing, const double *place, rm_limits limits);
 
-/* The greatest factor in [0, 1] by which change may be added to content, scaled amounts in a volume, [num_fields] each, so that the
- * state of a system stays one that can be: density and internal energy above a tenth of the least around, amounts per mass within
- * limits, up to rounding. Content alone is such a state. slack is what rounding may take, relative. */
+/* The greatest factor in [0, 1] by which change may be added to content, scaled amounts in a volume, [num_fields] each, so that
+ * the state of a system stays one that can be: density and internal energy above a tenth of the least around, amounts per mass
+ * within limits, up to rounding. Content alone is such a state. slack is what rounding may take, relative. */
 double rm_admit_factor(const rm_packing *packing, int s, const double *content, const double *change, double volume,
                        rm_limits limits, double slack);
 
 /* admission -- the rounds in which slopes are scaled until every receiving cell's state can be. */
 typedef struct rm_admission {
-  rm_flow  refusals; /* of receiving cells, to their givers           */
-  rm_flow  factors;  /* of giving cells, to those who receive         */
-  uint8_t *refused;  /* [receiving cells][num_systems]                */
+  rm_flow  refusals;  /* of receiving cells, to their givers           */
+  rm_flow  factors;   /* of giving cells, to those who receive         */
+  uint8_t *refused;   /* [receiving cells][num_systems]                */
   uint8_t *is_scaled; /* [giving cells][num_systems]                  */
-  double  *factor;   /* [giving cells][num_systems] of this round     */
-  double  *room;     /* [4][num_fields]                               */
+  double  *factor;    /* [giving cells][num_systems] of this round     */
+  double  *room;      /* [4][num_fields]                               */
 } rm_admission;
 
 remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, const rm_load *load, rm_admission *admission);
 /* got, [givers of the rows][width], is what pack, of the giving cells, has brought: both are scaled. Collective. */
-void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing, double *pack, double *got,
-                      rm_word *word);
+void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing, double *pack,
+                      double *got, rm_word *word);
 
 /* ---- caas ------------------------------------------------------------------------------------------------------ */
 
@@ -323,8 +326,9 @@ typedef struct rm_origin {
   rm_lid cell;
 } rm_origin;
 
-/* The mapped cell of nearest centroid for each of num_points points, by distance, then centroid, then global id. Collective; some
- * cell is mapped somewhere. found is [num_points]. Working memory from scratch. O(log n) per point and rank that is near. */
+/* The mapped cell of nearest centroid for each of num_points points, by distance, then centroid, then global id. Collective;
+ * some cell is mapped somewhere. found is [num_points]. Working memory from scratch. O(log n) per point and rank that is near.
+ */
 remap_status rm_nearest_anywhere(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const uint8_t *cover,
                                  int64_t num_points, const double (*point)[3], rm_origin *found);
 
@@ -357,9 +361,10 @@ remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setu
 
 /* ---- gather ---------------------------------------------------------------------------------------------------- */
 
-/* Values of field f in the giving cells, [giving cells][num_fields]. Those that nobody may have count as 0, whatever stands there.
- * BAD_VALUE. */
-remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given, rm_reason *reason);
+/* Values of field f in the giving cells, [giving cells][num_fields]. Those that nobody may have count as 0, whatever stands
+ * there. BAD_VALUE. */
+remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given,
+                             rm_reason *reason);
 /* Old values, where they are used, [receiving cells][num_fields]. BAD_VALUE. */
 remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason);
 /* Old values of systems, where they are mixed with new ones, to amounts per volume; room is [num_fields]. BAD_VALUE. */
@@ -373,8 +378,8 @@ void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, 
 /* Turn vectors into the frame of those who receive. */
 void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, double *given);
 /* What is reconstructed, from what is given; they may be the same array. BAD_VALUE if a density is not positive. */
-remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given, double *number,
-                               const char *which, rm_reason *reason);
+remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
+                               double *number, const char *which, rm_reason *reason);
 
 /* ---- receive --------------------------------------------------------------------------------------------------- */
 
@@ -382,7 +387,7 @@ remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const r
 struct rm_receipt {
   const rm_transfer_setup *setup;
   const remap_transfer    *how;
-  const remap_field_desc  *fields;   /* [packing->num_fields]                                     */
+  const remap_field_desc  *fields; /* [packing->num_fields]                                     */
   const rm_packing        *packing;
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */

@@ -1,10 +1,11 @@
-/* gather -- values between the caller's arrays, strided and block by block, and those of a transfer, cell after cell; vectors are
- * turned and systems converted on the way. O(cells) per field. */
+/* gather -- values between the caller's arrays, strided and block by block, and those of a transfer, cell after cell; vectors
+ * are turned and systems converted on the way. O(cells) per field. */
 #include "field_private.h"
 
 #include <stdio.h>
 
-/* The values of one block of one field: of cells first to end - 1, that of cell i at array + stride * (place[i] or i - zero). */
+/* The values of one block of one field: of cells first to end - 1, that of cell i at array + stride * (place[i] or i - zero).
+ */
 typedef struct strip {
   const rm_layout *layout;
   rm_lid           first, end, zero;
@@ -46,8 +47,8 @@ static label label_of(const rm_packing *packing, int f)
   return l;
 }
 
-static remap_status bad_value(const rm_packing *packing, int f, const rm_mesh *mesh, rm_lid cell, double value, const char *which,
-                              rm_reason *reason)
+static remap_status bad_value(const rm_packing *packing, int f, const rm_mesh *mesh, rm_lid cell, double value,
+                              const char *which, rm_reason *reason)
 {
   return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[cell], "field %s: %s value %g is not a finite number",
                  label_of(packing, f).text, which, value);
@@ -74,7 +75,10 @@ remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *p
 }
 
 /* Where the values of a block's receiving cells go. */
-static double *out_of(const remap_field_desc *field, int block) { return field->out_block ? field->out_block[block] : field->out; }
+static double *out_of(const remap_field_desc *field, int block)
+{
+  return field->out_block ? field->out_block[block] : field->out;
+}
 
 remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason)
 {
@@ -141,8 +145,8 @@ void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, 
   }
 }
 
-remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given, double *number,
-                               const char *which, rm_reason *reason)
+remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
+                               double *number, const char *which, rm_reason *reason)
 {
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
     const int64_t at  = (int64_t)c * packing->num_fields;
@@ -183,7 +187,8 @@ remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing 
     if (!rm_system_numbers(packing, old, room, &bad))
       return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[c], "field %s: the old density %g is not above 0",
                      label_of(packing, bad).text, old[bad]);
-    for (int f = 0; f < num; f++) old[f] = rm_system_amount(packing, f, old, room); /* those per mass do not read what is done */
+    for (int f = 0; f < num; f++)
+      old[f] = rm_system_amount(packing, f, old, room); /* those per mass do not read what is done */
   }
   return REMAP_OK;
 }
@@ -195,7 +200,7 @@ void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, d
   const int        num    = packing->num_fields;
 
   for (int f = 0; f < num; f++) {
-    const remap_field_desc *field = &packing->fields[f];
+    const remap_field_desc *field   = &packing->fields[f];
     const bool              is_read = rm_is_blended(setup, packing->how, field);
 
     for (int b = 0; b < num_strips(layout); b++) {
@@ -210,6 +215,7 @@ void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, d
     int bad;
 
     if (!rm_system_numbers(packing, given + (int64_t)c * num, number + (int64_t)c * num, &bad))
-      for (int f = 0; f < num; f++) number[(int64_t)c * num + f] = packing->system_of[f] < 0 ? given[(int64_t)c * num + f] : (double)NAN;
+      for (int f = 0; f < num; f++)
+        number[(int64_t)c * num + f] = packing->system_of[f] < 0 ? given[(int64_t)c * num + f] : (double)NAN;
   }
 }

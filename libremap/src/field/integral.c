@@ -28,11 +28,11 @@ void rm_integral_source(const rm_profile *w, const rm_packing *packing, rm_integ
   for (int f = 0; f < num; f++) {
     if (packing->fields[f].nature == REMAP_FLAG) continue;
     for (rm_lid c = 0; c < mesh->num_cells; c++) {
-      const double *place  = w->pack + (int64_t)c * packing->width + packing->at[f];
-      const double  amount = rm_system_amount(packing, f, w->given + (int64_t)c * num, w->number + (int64_t)c * num);
+      const double *place   = w->pack + (int64_t)c * packing->width + packing->at[f];
+      const double  amount  = rm_system_amount(packing, f, w->given + (int64_t)c * num, w->number + (int64_t)c * num);
       const double  measure = w->ground.measure && rm_is_amount(packing, f) ? w->ground.measure[c] : 1.0;
-      const double  value  = RM_VALUE_SCALE * amount * measure, volume = mesh->cell_volume[c];
-      const double *slope  = packing->degree[f] > 0 ? place + RM_PACK_SLOPE : NULL;
+      const double  value = RM_VALUE_SCALE * amount * measure, volume = mesh->cell_volume[c];
+      const double *slope     = packing->degree[f] > 0 ? place + RM_PACK_SLOPE : NULL;
       const double *curvature = packing->degree[f] > 1 ? place + rm_pack_curvature(packing->has_bounds) : NULL;
 
       if (rows->cover[c] == REMAP_COVERED) {

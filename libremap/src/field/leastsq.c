@@ -1,12 +1,12 @@
 /* leastsq -- the weights of a least-squares gradient in one cell, and the axes in which its neighbours spread evenly.
  *
  * Minimise sum over k of (w_k (g.d_k - du_k))^2 with w_k = 1/(|d_k| |W d_k|), so that near neighbours count more. W d are
- * distances in the axes in which the neighbours spread evenly: cells of any shape have near ones among them; |d_k| lets a gradient
- * across curved layers of thin cells survive, and more of it would cost digits there. The matrix A = (w_k d_k) is factored
- * A = Q R by Gram-Schmidt, every column orthogonalised twice, with columns scaled to unit length and pivoting. Columns of rounding
- * only are left out first: unit length would turn them into slopes. If the rest has lower rank too (a thin mesh that is not
- * parallel to an axis), the slope is sought within the space of the distances alone, so that it is 0 in every direction they do
- * not span. O(n) time per cell. */
+ * distances in the axes in which the neighbours spread evenly: cells of any shape have near ones among them; |d_k| lets a
+ * gradient across curved layers of thin cells survive, and more of it would cost digits there. The matrix A = (w_k d_k) is
+ * factored A = Q R by Gram-Schmidt, every column orthogonalised twice, with columns scaled to unit length and pivoting. Columns
+ * of rounding only are left out first: unit length would turn them into slopes. If the rest has lower rank too (a thin mesh
+ * that is not parallel to an axis), the slope is sought within the space of the distances alone, so that it is 0 in every
+ * direction they do not span. O(n) time per cell. */
 #include "field_private.h"
 
 /* A = Q R over the columns that are linearly independent, in pivot order. */
@@ -37,8 +37,8 @@ static double remove_part(int64_t n, double (*a)[3], int unit, int c)
   return part;
 }
 
-/* Factor the first num_columns columns of a, in place: column f->column[p] becomes the p-th column of Q. Columns of length 0 are
- * left out; so is what is shorter than tolerance once the pivots before are taken out. */
+/* Factor the first num_columns columns of a, in place: column f->column[p] becomes the p-th column of Q. Columns of length 0
+ * are left out; so is what is shorter than tolerance once the pivots before are taken out. */
 static void factor(int64_t n, double (*a)[3], int num_columns, double tolerance, factors *f)
 {
   bool is_used[3] = {false, false, false};
@@ -109,8 +109,9 @@ static int row_space(const factors *f, double basis[3][3])
   return num;
 }
 
-/* Row weights, 1/(|d| |W d|) or 1 without axes W, but 0 where the distance is rounding only; d becomes w d, without the columns that
- * span nothing. The number of columns left; *noise_length receives the largest length that rounding has in a scaled column. */
+/* Row weights, 1/(|d| |W d|) or 1 without axes W, but 0 where the distance is rounding only; d becomes w d, without the columns
+ * that span nothing. The number of columns left; *noise_length receives the largest length that rounding has in a scaled
+ * column. */
 static int weigh_rows(int64_t n, double (*d)[3], int num_axes, const double axes[3][3], const rm_distance_noise *noise,
                       double *row_weight, double *noise_length)
 {
@@ -187,7 +188,7 @@ int rm_leastsq_axes(int64_t n, double (*d)[3], const rm_distance_noise *noise, d
 void rm_leastsq_weights(int64_t n, double (*d)[3], const rm_distance_noise *noise, double *scratch, double (*weight)[3])
 {
   double  noise_length, axes[3][3], basis[3][3] = {{0.0}};
-  int     num_axes, num, dim = 3;
+  int     num_axes, num, dim                    = 3;
   factors f;
 
   for (int64_t k = 0; k < n; k++)

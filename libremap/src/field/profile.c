@@ -1,6 +1,6 @@
-/* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the limiter
- * auto slopes, then which cells are rough, twice; with systems a reduction over all ranks. O(neighbours) per cell and field; 16 to
- * 56 bytes per cell and field, 40 more for auto, 56 more for polynomials of degree 2. */
+/* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the
+ * limiter auto slopes, then which cells are rough, twice; with systems a reduction over all ranks. O(neighbours) per cell and
+ * field; 16 to 56 bytes per cell and field, 40 more for auto, 56 more for polynomials of degree 2. */
 #include "field_private.h"
 
 void rm_word_add(rm_word *word, remap_status status)
@@ -30,17 +30,18 @@ static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
   for (rm_lid c = 0; c < stencil->num_cells; c++) {
     for (int64_t k = stencil->offset[c]; k < stencil->offset[c + 1]; k++)
       needs_halo[c] |= stencil->neighbour[k] >= stencil->num_cells;
-    for (int64_t k = stencil->wide_offset ? stencil->wide_offset[c] : 0; stencil->wide_offset && k < stencil->wide_offset[c + 1]; k++)
+    for (int64_t k = stencil->wide_offset ? stencil->wide_offset[c] : 0;
+         stencil->wide_offset && k < stencil->wide_offset[c + 1]; k++)
       needs_halo[c] |= stencil->wide_neighbour[k] >= stencil->num_cells;
   }
 }
 
 remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *p)
 {
-  const rm_lid  cells = p->ground.mesh->num_cells;
-  const int     n     = load->num_fields;
-  const size_t  bytes = (size_t)n * sizeof(double);
-  const rm_plan *plan = load->has_slopes ? p->ground.stencil->plan : NULL;
+  const rm_lid   cells = p->ground.mesh->num_cells;
+  const int      n     = load->num_fields;
+  const size_t   bytes = (size_t)n * sizeof(double);
+  const rm_plan *plan  = load->has_slopes ? p->ground.stencil->plan : NULL;
 
   RM_NEW0(p->needs_halo, arena, cells);
   RM_NEW(p->pack, arena, rm_mul_sat(cells, load->width));

@@ -1,11 +1,11 @@
 /* quadratic -- the weights of a least-squares quadratic polynomial in one cell.
  *
- * Minimise sum over k of (w_k (g.d_k + H:(d_k d_k^T + Q_k) - du_k))^2, Q_k being the neighbour's mean of (x - c_k)(x - c_k)^T less
- * the cell's own, so that polynomial and data are compared by their means and quadratic fields come out exactly. Everything is
- * done in the axes in which the neighbours spread evenly, q = W d: so neither stretching nor rotation of a mesh matters, and in
- * directions that the neighbours do not span there is neither slope nor curvature. w_k = 1/|q_k|^3, so that near neighbours count
- * more. Columns are scaled to unit length and orthogonalised twice, the longest that is left first; the last one's length tells how
- * well the neighbours determine the polynomial. O(n) time. */
+ * Minimise sum over k of (w_k (g.d_k + H:(d_k d_k^T + Q_k) - du_k))^2, Q_k being the neighbour's mean of (x - c_k)(x - c_k)^T
+ * less the cell's own, so that polynomial and data are compared by their means and quadratic fields come out exactly.
+ * Everything is done in the axes in which the neighbours spread evenly, q = W d: so neither stretching nor rotation of a mesh
+ * matters, and in directions that the neighbours do not span there is neither slope nor curvature. w_k = 1/|q_k|^3, so that
+ * near neighbours count more. Columns are scaled to unit length and orthogonalised twice, the longest that is left first; the
+ * last one's length tells how well the neighbours determine the polynomial. O(n) time. */
 #include "field_private.h"
 
 enum { MOST = 9 };

@@ -1,5 +1,5 @@
-/* receive -- what receiving cells make of what giving cells sent: the content of each is the sum over its row of u V + g.M + h:S,
- * and its coverage decides what becomes of that. O(pairs) per field. */
+/* receive -- what receiving cells make of what giving cells sent: the content of each is the sum over its row of u V + g.M +
+ * h:S, and its coverage decides what becomes of that. O(pairs) per field. */
 #include "field_private.h"
 
 bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover)
@@ -30,8 +30,8 @@ typedef struct row_sums {
 
 /* What one giver sent for a field. */
 typedef struct giver_view {
-  double        value; /* scaled                                            */
-  const double *slope; /* scaled; behind it the bounds, if there are any    */
+  double        value;     /* scaled                                            */
+  const double *slope;     /* scaled; behind it the bounds, if there are any    */
   const double *curvature; /* scaled, and its constant; NULL below degree 2     */
 } giver_view;
 
@@ -141,8 +141,8 @@ static bool is_normalised(const rm_receipt *w, int f, rm_lid cell)
   return cover == REMAP_PARTIAL && !rm_keeps_old(w->how, &w->fields[f], cover) && w->how->on_partial != REMAP_PARTIAL_CONSERVE;
 }
 
-/* Add the old content of a cell on what its pairs leave of it, scaled: as if it were uniform, and what slopes add. Moments of what is
- * left are those of the cell less those of the pairs. */
+/* Add the old content of a cell on what its pairs leave of it, scaled: as if it were uniform, and what slopes add. Moments of
+ * what is left are those of the cell less those of the pairs. */
 static void add_kept(const rm_receipt *w, int f, rm_lid cell, double old, const row_sums *s, double *content, double *change)
 {
   const rm_rows *rows   = w->setup->rows;
@@ -184,8 +184,8 @@ static bool is_blend(const rm_receipt *w, int f, rm_lid cell)
   return rm_keeps_old(w->how, &w->fields[f], w->setup->rows->cover[cell]);
 }
 
-/* The scaled new value of a cell with pairs that is not normalised, from what it gets and what it keeps, 0 unless it blends; its part
- * in the integral goes to integral, if that is not NULL. */
+/* The scaled new value of a cell with pairs that is not normalised, from what it gets and what it keeps, 0 unless it blends;
+ * its part in the integral goes to integral, if that is not NULL. */
 static double receive_content(const rm_receipt *w, int f, rm_lid cell, double old, double kept, const row_sums *s,
                               rm_integral *integral)
 {
@@ -240,7 +240,8 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
   }
   copied = w->got[(int64_t)rows->giver[first] * w->packing->width + w->packing->at[f]];
   if (integral)
-    rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied * measure_of(w, f, cell), w->setup->receiving->cell_volume[cell]);
+    rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied * measure_of(w, f, cell),
+                    w->setup->receiving->cell_volume[cell]);
   return copied;
 }
 
@@ -299,9 +300,9 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const doub
 /* The new values of a system in a mapped cell: amounts, to be converted, but for copies. */
 static void receive_system(const rm_receipt *w, int system, rm_lid cell, double *value)
 {
-  const rm_packing *p     = w->packing;
-  const rm_rows    *rows  = w->setup->rows;
-  const int64_t     first = rows->offset[cell];
+  const rm_packing *p       = w->packing;
+  const rm_rows    *rows    = w->setup->rows;
+  const int64_t     first   = rows->offset[cell];
   const int         density = p->system[system].density;
   const double     *given   = w->got + (int64_t)rows->giver[first] * p->width;
   double           *kept    = w->room + 4 * p->num_fields;
@@ -334,7 +335,8 @@ static void integrate_copies(const rm_receipt *w, rm_lid cell, const double *val
   if (!w->integral || !rm_system_numbers(w->packing, value, number, &bad)) return;
   for (int f = 0; f < w->packing->num_fields; f++)
     if (w->packing->system_of[f] >= 0)
-      rm_integral_add(&w->integral[f].minus_target, -RM_VALUE_SCALE * rm_system_amount(w->packing, f, value, number) * measure_of(w, f, cell),
+      rm_integral_add(&w->integral[f].minus_target,
+                      -RM_VALUE_SCALE * rm_system_amount(w->packing, f, value, number) * measure_of(w, f, cell),
                       w->setup->receiving->cell_volume[cell]);
 }
 

@@ -2,8 +2,9 @@
  * polynomial, limited if asked for.
  *
  * Coefficients are sums of the stencil's weights times differences to the neighbours, in canonical order. Barth-Jespersen: the
- * greatest factor in [0, 1] with which no node of the cell gets a value beyond those of the cell and its neighbours; a quadratic
- * polynomial that may leave these bounds anywhere in the cell gives way to the limited slope. Values are scaled by a power of two, so nothing overflows and no digit changes. O(neighbours) per cell and field. */
+ * greatest factor in [0, 1] with which no node of the cell gets a value beyond those of the cell and its neighbours; a
+ * quadratic polynomial that may leave these bounds anywhere in the cell gives way to the limited slope. Values are scaled by a
+ * power of two, so nothing overflows and no digit changes. O(neighbours) per cell and field. */
 #include "field_private.h"
 
 /* The factor by which the slope may stay so that the nodes keep within [least, greatest]. */
@@ -23,8 +24,8 @@ static double barth_jespersen(const rm_stencil *stencil, const rm_mesh *mesh, rm
   return factor;
 }
 
-/* Does a quadratic polynomial keep within [least, greatest] in the hull of the nodes? It lies between the least and the greatest of
- * its polar form, rest + g.(y + z)/2 + h:(y z^T), over pairs of nodes. */
+/* Does a quadratic polynomial keep within [least, greatest] in the hull of the nodes? It lies between the least and the
+ * greatest of its polar form, rest + g.(y + z)/2 + h:(y z^T), over pairs of nodes. */
 static bool keeps_within(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, double value, const double *slope,
                          const double *curvature, double least, double greatest)
 {
@@ -117,10 +118,10 @@ static bool is_carried(const rm_packing *packing, int f)
 
 static void fit_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, int f, bool is_smooth, fit *out)
 {
-  const rm_stencil *stencil = w->ground.stencil;
-  const rm_mesh    *mesh    = w->ground.mesh;
-  const rm_around   u       = rm_around_of((rm_numbers){w->number, rm_flow_numbers(&w->halo)}, f, packing->num_fields);
-  const double      value   = rm_value_at(&u, mesh->num_cells, cell);
+  const rm_stencil *stencil    = w->ground.stencil;
+  const rm_mesh    *mesh       = w->ground.mesh;
+  const rm_around   u          = rm_around_of((rm_numbers){w->number, rm_flow_numbers(&w->halo)}, f, packing->num_fields);
+  const double      value      = rm_value_at(&u, mesh->num_cells, cell);
   const double      extreme[2] = {w->extreme[f], w->extreme[packing->num_fields + f]};
 
   *out = (fit){.factor = 1.0};
@@ -172,7 +173,7 @@ static bool is_smooth_cell(const rm_profile *w, const rm_packing *packing, rm_li
 /* The mass fractions of a system keep their sum: they are limited alike. */
 static void reconstruct_fractions(const rm_profile *w, const rm_packing *packing, rm_lid cell, int s, double *place)
 {
-  const int num = packing->num_fields;
+  const int num       = packing->num_fields;
   bool      is_smooth = true, is_quadratic = true;
   double    factor = 1.0;
   fit       x;
@@ -237,7 +238,8 @@ static void measure_cell(const rm_profile *w, const rm_packing *packing, rm_lid 
     if (!rm_is_amount(packing, f)) continue;
     at[0] *= w->ground.measure[cell];
     for (int d = 0; d < 3 && packing->degree[f] > 0; d++) at[RM_PACK_SLOPE + d] *= w->ground.measure[cell];
-    for (int k = 0; k < 7 && packing->degree[f] > 1; k++) at[rm_pack_curvature(packing->has_bounds) + k] *= w->ground.measure[cell];
+    for (int k = 0; k < 7 && packing->degree[f] > 1; k++)
+      at[rm_pack_curvature(packing->has_bounds) + k] *= w->ground.measure[cell];
   }
 }
 

@@ -1,5 +1,5 @@
-/* search -- the mapped cell of nearest centroid in a distributed mesh. Every rank holds a k-d tree of its mapped cells; a point asks
- * the rank whose box is nearest first, then every rank whose box is not farther than the answer. Box distances are rounded
+/* search -- the mapped cell of nearest centroid in a distributed mesh. Every rank holds a k-d tree of its mapped cells; a point
+ * asks the rank whose box is nearest first, then every rank whose box is not farther than the answer. Box distances are rounded
  * like true ones, so they never exceed them, and the answer is the same for every partition. */
 #include "field_private.h"
 

@@ -1,14 +1,15 @@
 /* smooth -- which cells lie where a field is smooth, for the limiter `auto` (libremap/doc/limiters.md).
  *
- * In smooth parts the difference of two neighbours is what the mean of their slopes says, up to the third order of their distance:
- * to the second at walls and on uneven meshes. At a jump it errs by a part of the jump, about one half. So a cell is as rough as
+ * In smooth parts the difference of two neighbours is what the mean of their slopes says, up to the third order of their
+ * distance: to the second at walls and on uneven meshes. At a jump it errs by a part of the jump, about one half. So a cell is
+ * as rough as
  *
  *   max over k of |u_k - u - (g + g_k).d_k / 2|  /  max over k of |u_k - u|,
  *
  * which is of the first order of the cells' size where the slope is not 0, of the same order at smooth extrema (there both fall
- * with the square of the size) if slopes are good to second order, and 1/4 to 1/2 beside jumps, however small those are. A cell is
- * smooth if no cell within two layers of neighbours is rougher than a threshold below that: a jump of one and a half cells before a
- * wall looks linear from the wall, and is rough only on its far side.
+ * with the square of the size) if slopes are good to second order, and 1/4 to 1/2 beside jumps, however small those are. A cell
+ * is smooth if no cell within two layers of neighbours is rougher than a threshold below that: a jump of one and a half cells
+ * before a wall looks linear from the wall, and is rough only on its far side.
  *
  * Slopes of other ranks' cells come in one exchange, roughness in two. O(neighbours) per cell and field. */
 #include "field_private.h"

@@ -1,15 +1,15 @@
 /* system -- fields that are moved together: mass and what moves with it.
  *
- * What is reconstructed are density r, amounts per mass q (velocity u, others) and internal energy per volume w, which is pressure
- * but for a constant: so pressure stays uniform where it is, whatever density does. (Where temperature is given, internal energy per
- * mass is reconstructed, and temperature stays uniform.) Polynomials are multiplied, so that amounts per volume travel: r q, and w +
- * r u.u / 2 for the total energy. With polynomials about the centroid
+ * What is reconstructed are density r, amounts per mass q (velocity u, others) and internal energy per volume w, which is
+ * pressure but for a constant: so pressure stays uniform where it is, whatever density does. (Where temperature is given,
+ * internal energy per mass is reconstructed, and temperature stays uniform.) Polynomials are multiplied, so that amounts per
+ * volume travel: r q, and w + r u.u / 2 for the total energy. With polynomials about the centroid
  *
  *   r = r0 + g.y + h:(y y^T),   q = q0 + G.y + K:(y y^T),   r q = r0 q0 + (r0 G + q0 g).y + (r0 K + q0 h + g G):(y y^T) + ...
  *
- * is a polynomial of degree 2, exactly so at order 2, where h = K = 0; at order 3 what is left out is of third order. q0 is such
- * that the mean over the cell is the cell's amount: at order 2, q is linear about the centre of mass. Where q is uniform, r q is q
- * times r to the last bits, so it stays uniform (after R. B. DeBar, UCIR-760, 1974). O(fields) per cell. */
+ * is a polynomial of degree 2, exactly so at order 2, where h = K = 0; at order 3 what is left out is of third order. q0 is
+ * such that the mean over the cell is the cell's amount: at order 2, q is linear about the centre of mass. Where q is uniform,
+ * r q is q times r to the last bits, so it stays uniform (after R. B. DeBar, UCIR-760, 1974). O(fields) per cell. */
 #include "field_private.h"
 
 /* ---- which fields ---------------------------------------------------------------------------------------------- */
@@ -61,17 +61,21 @@ static remap_status check_member(const remap_transfer *how, const remap_field_de
 {
   const remap_role role = field->role;
 
-  if (role < REMAP_ROLE_OTHER || role > REMAP_ROLE_MASS_FRACTION) return bad_field(field, "its role is not one of its enum", reason);
+  if (role < REMAP_ROLE_OTHER || role > REMAP_ROLE_MASS_FRACTION)
+    return bad_field(field, "its role is not one of its enum", reason);
   if (s->density < 0) return bad_field(field, "its system has no density: give one, or system 0", reason);
   if ((role == REMAP_ROLE_DENSITY && s->density != f) || (is_moving(role) && s->motion[axis_of(role)] != f) ||
       (is_energy(role) && s->energy != f))
-    return bad_field(field, "its system has another density, momentum or velocity along this axis, or energy, pressure or "
-                            "temperature: give it role OTHER", reason);
+    return bad_field(field,
+                     "its system has another density, momentum or velocity along this axis, or energy, pressure or "
+                     "temperature: give it role OTHER",
+                     reason);
   if ((role == REMAP_ROLE_OTHER || role == REMAP_ROLE_MASS_FRACTION || role == REMAP_ROLE_ENERGY) &&
       field->nature != REMAP_CONSERVED && field->nature != REMAP_MASS_SPECIFIC)
     return bad_field(field, "in a system it is conserved or mass-specific", reason);
   if (field->nature == REMAP_FLAG) return bad_field(field, "a flag is in no system", reason);
-  if (!field->has_old != !fields[s->density].has_old) return bad_field(field, "all of a system have old values, or none", reason);
+  if (!field->has_old != !fields[s->density].has_old)
+    return bad_field(field, "all of a system have old values, or none", reason);
   if ((role == REMAP_ROLE_PRESSURE || role == REMAP_ROLE_TEMPERATURE) && !(how->gamma > 1.0))
     return bad_field(field, "pressure and temperature need gamma above 1: give it, or system 0", reason);
   if (role == REMAP_ROLE_TEMPERATURE && !(how->gas_constant > 0.0))
@@ -99,12 +103,14 @@ remap_status rm_systems_check(const remap_transfer *how, int num_fields, const r
   for (int f = 0; f < num_fields; f++) {
     int num = 0;
 
-    if (fields[f].system < 0 || fields[f].vector < 0) return bad_field(&fields[f], "numbers of systems and vectors are not below 0", reason);
+    if (fields[f].system < 0 || fields[f].vector < 0)
+      return bad_field(&fields[f], "numbers of systems and vectors are not below 0", reason);
     if (fields[f].system > 0) {
       const rm_system s = system_of(num_fields, fields, fields[f].system);
 
       RM_TRY(check_member(how, &fields[f], f, &s, fields, reason));
-      if (fields[f].vector > 0 && is_moving(fields[f].role)) return bad_field(&fields[f], "what moves in a system is a vector by itself: give vector 0", reason);
+      if (fields[f].vector > 0 && is_moving(fields[f].role))
+        return bad_field(&fields[f], "what moves in a system is a vector by itself: give vector 0", reason);
     }
     for (int k = 0; k < num_fields; k++) num += fields[k].vector == fields[f].vector;
     if (fields[f].vector > 0 && num != 3) return bad_field(&fields[f], "a vector has three components", reason);
@@ -183,7 +189,8 @@ double rm_system_amount(const rm_packing *p, int f, const double *given, const d
   const rm_system *s = p->system_of[f] >= 0 ? &p->system[p->system_of[f]] : NULL;
 
   if (!s || is_per_volume(&p->fields[f])) return given[f];
-  if (f == s->energy && !rm_system_is_energy_per_mass(p, p->system_of[f])) return number[f] + number[s->density] * kinetic(s, number);
+  if (f == s->energy && !rm_system_is_energy_per_mass(p, p->system_of[f]))
+    return number[f] + number[s->density] * kinetic(s, number);
   if (f == s->energy) return number[s->density] * (number[f] + kinetic(s, number));
   return number[s->density] * number[f];
 }
@@ -237,15 +244,15 @@ static void multiply(const double g[3], const double G[3], double scale, double 
 static polynomial polynomial_of(const rm_packing *p, int f, double mean, const double *place)
 {
   const double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
-  polynomial    q  = {.value = mean};
+  polynomial    q = {.value = mean};
 
   for (int d = 0; d < 3; d++) q.slope[d] = at[RM_PACK_SLOPE + d];
   for (int k = 0; k < 6; k++) q.curvature[k] = h[k];
   return q;
 }
 
-/* Density times q, of which the mass-weighted mean is q->value: coefficients of amounts per volume. spread is the cell's mean of y
- * y^T. r->value is the density at the centroid, mean its mean. */
+/* Density times q, of which the mass-weighted mean is q->value: coefficients of amounts per volume. spread is the cell's mean
+ * of y y^T. r->value is the density at the centroid, mean its mean. */
 static polynomial times_density(const polynomial *r, double mean, const polynomial *q, const double spread[6])
 {
   polynomial product;
@@ -259,7 +266,8 @@ static polynomial times_density(const polynomial *r, double mean, const polynomi
   return product;
 }
 
-/* Add the kinetic energy of the velocities, per mass: u.u / 2 = u0.u0 / 2 + u0.(G y + ...) + (G y).(G y) / 2, but for its value. */
+/* Add the kinetic energy of the velocities, per mass: u.u / 2 = u0.u0 / 2 + u0.(G y + ...) + (G y).(G y) / 2, but for its
+ * value. */
 static void add_kinetic(polynomial *e, const polynomial u[3], const bool is_there[3])
 {
   for (int d = 0; d < 3; d++) {
@@ -281,7 +289,8 @@ static bool is_finite_polynomial(const polynomial *q)
   return isfinite(sum);
 }
 
-/* Coefficients into the pack, with the constant that makes their mean 0; the true centroid lies error beyond that of the moments. */
+/* Coefficients into the pack, with the constant that makes their mean 0; the true centroid lies error beyond that of the
+ * moments. */
 static void put(const rm_packing *p, int f, const polynomial *q, const double spread[6], const double error[3], double *place)
 {
   double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
@@ -351,8 +360,8 @@ static polynomial total_energy(const rm_packing *p, int system, const factors *w
 void rm_system_combine(const rm_packing *p, int system, const double *given, const double *number, const double second[6],
                        double volume, const double centroid_error[3], double *place)
 {
-  const rm_system *s = &p->system[system];
-  const factors    w = factors_of(p, s, number, second, volume, place);
+  const rm_system *s       = &p->system[system];
+  const factors    w       = factors_of(p, s, number, second, volume, place);
   bool             is_good = w.is_body;
 
   for (int f = 0; f < p->num_fields && is_good; f++) {

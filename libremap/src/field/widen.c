@@ -1,9 +1,9 @@
-/* widen -- a stencil for order 3: quadratic least squares over vertex neighbours, and over their neighbours too where the former
- * do not determine a quadratic polynomial (at walls, mostly).
+/* widen -- a stencil for order 3: quadratic least squares over vertex neighbours, and over their neighbours too where the
+ * former do not determine a quadratic polynomial (at walls, mostly).
  *
- * Neighbours of a halo cell are known on its own rank; where they are wanted, they are asked for in two exchanges. Then the halo
- * is listed anew, with a plan of its own. What a cell gets depends on coordinates alone. O(n) time; for hexahedra about 2 kB per
- * cell. */
+ * Neighbours of a halo cell are known on its own rank; where they are wanted, they are asked for in two exchanges. Then the
+ * halo is listed anew, with a plan of its own. What a cell gets depends on coordinates alone. O(n) time; for hexahedra about 2
+ * kB per cell. */
 #include "field_private.h"
 
 /* A cell as its neighbours see it. */
