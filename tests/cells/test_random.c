@@ -1,25 +1,7 @@
 /* Supermeshes of random meshes whose coordinates have so few bits that vertices, edges and faces of the two coincide, cross and
  * touch in every way. What fails prints its seed. */
+#include "rough.h"
 #include "super.h"
-
-/* A mesh of a random kind, place and roughness. */
-typedef struct recipe {
-  uint64_t seed;
-  int      steps; /* coordinates are multiples of 1 / steps   */
-  int      rough; /* nodes move by up to so many of them      */
-  double   scale[3], shift[3];
-} recipe;
-
-static void rough_node(double xyz[3], const void *data)
-{
-  const recipe *r = data;
-  uint64_t      h = r->seed ^ rm_hash_point(xyz);
-
-  for (int c = 0; c < 3; c++) {
-    const double move = r->rough ? (double)(tm_random(&h, 2 * r->rough + 1) - r->rough) : 0;
-    xyz[c]            = (rint((xyz[c] * r->scale[c] + r->shift[c]) * r->steps) + move) / r->steps;
-  }
-}
 
 /* Every cell is seen from the mean of its vertices, clearly: neither tangled nor inverted. */
 static bool is_plain(const rm_trimesh *m)
@@ -38,32 +20,11 @@ static bool is_plain(const rm_trimesh *m)
   return true;
 }
 
-static tm_mesh *random_mesh(uint64_t *seed, bool rough)
-{
-  const int kind = (int)tm_random(seed, 7), most = kind < 2 ? 3 : 2;
-  const int n[3] = {1 + (int)tm_random(seed, most), 1 + (int)tm_random(seed, most), 1 + (int)tm_random(seed, most)};
-  recipe    r    = {*seed, 16 << tm_random(seed, 3), 0, {0, 0, 0}, {0, 0, 0}};
-
-  for (int c = 0; c < 3; c++) {
-    r.scale[c] = .5 + .25 * (double)tm_random(seed, 3);
-    r.shift[c] = .125 * (double)tm_random(seed, 5) - .25;
-  }
-  r.rough = rough ? (int)tm_random(seed, 2) * (r.steps / 16) : 0;
-  switch (kind) {
-    case 2: return tm_tetrahedra(n, rough_node, &r);
-    case 3: return tm_prisms(n, rough_node, &r);
-    case 4: return tm_pyramids(n, rough_node, &r);
-    case 5: return tm_refined((int[]){2, 1, 1}, tm_right_half, rough_node, &r);
-    case 6: return tm_dual((int[]){1, 1, 1}, rough_node, &r);
-    default: return tm_hexahedra(n, rough_node, &r);
-  }
-}
-
 static bool try_seed(uint64_t number, bool rough)
 {
   uint64_t          seed   = 1000 * number;
   const int         before = rt_failed_;
-  tm_mesh          *a = random_mesh(&seed, rough), *b = random_mesh(&seed, rough);
+  tm_mesh          *a = rough_mesh(&seed, rough), *b = rough_mesh(&seed, rough);
   const remap_faces faces = tm_random(&seed, 2) ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL;
   super             s     = super_of(a, b, faces, NULL, SUPER_UNION);
   const bool        plain = s.l->mesh[0] && s.l->mesh[1] && is_plain(s.l->mesh[0]) && is_plain(s.l->mesh[1]);
