@@ -3,6 +3,7 @@
  *
  *   rcgns_open             read a file's tree and this rank's part of its mesh    (collective)
  *   rcgns_mesh             that part, as remap_set_mesh wants it                  (not collective)
+ *   rcgns_read_boundaries  which of its faces are on which boundary condition     (collective)
  *   rcgns_select_solution  choose the FlowSolution_t whose fields are meant       (collective)
  *   rcgns_read_field       one cell field, in the order of this rank's cells      (collective)
  *   rcgns_read_cells       one of any node: masks, volumes                        (collective)
@@ -174,6 +175,19 @@ const rcgns_info *rcgns_get_info(const rcgns_file *file);
 /** This rank's part of the mesh, owned by the file until rcgns_close. Faces between two cells of this rank and one zone are
  *  joined; all others have neighbour -1. cell_global, name and zones are set. Not collective. */
 const remap_mesh *rcgns_mesh(const rcgns_file *file);
+
+/** The boundary conditions of a mesh; owned by the file until rcgns_close. Names and types are the same on every rank. */
+typedef struct rcgns_boundaries {
+  int                num;
+  const char *const *name; /**< [num] of BC_t; conditions of one name and type in several zones are one */
+  const char *const *type; /**< [num] "BCWall" and so on; of a family's condition where the family has one */
+  const int32_t     *face; /**< [faces of rcgns_mesh] number of the boundary, -1: none */
+} rcgns_boundaries;
+
+/** Which faces of this rank's mesh are on which BC_t: by PointRange in blocks, elsewhere by lists and ranges of faces,
+ *  elements or vertices. Where two name one face, the first has it. A condition that is given in another way is left out and
+ *  noted. Collective. Errors: IO (a list cannot be read), MEMORY. */
+rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgns_message *message);
 
 /** Choose the FlowSolution_t. Collective. choice NULL: the default. *out is a view owned by the file, valid until the next
  *  call of this function.

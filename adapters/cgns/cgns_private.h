@@ -10,6 +10,7 @@
  *   sids_mesh.c  this rank's part of the mesh
  *   sids_dual.c  the cells about its vertices instead
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
+ *   sids_bc.c      BC_t: which faces are on which boundary
  *   sids_fields.c  FlowSolution_t: choice, names, values
  *   sids_write.c   the plan of an output file, rcgns_write
  *   sids_create.c  plans from nothing, rcgns_create
@@ -83,6 +84,8 @@ typedef struct rc_map {
 
 /* Index of the key, which is added if new; -1: no memory. */
 int64_t rc_map_add(rc_map *map, const int64_t *key);
+/* Index of the key, -1: it is not there. */
+int64_t rc_map_find(const rc_map *map, const int64_t *key);
 void    rc_map_drop(rc_map *map);
 
 /* ---- distribution ------------------------------------------------------------------------------------------------- */
@@ -237,8 +240,16 @@ typedef struct rc_zone {
   int64_t     parent_base; /* by_parents: what ParentElements calls the first cell */
 } rc_zone;
 
+/* A face without neighbour on this rank, by what boundary conditions call it. key: in a block {2 axis + (it is the upper
+ * side), i, j, k of its cell}; of standard elements its nodes in the zone, ascending, then -1; of polyhedra {its element
+ * number, -1, -1, -1}. */
+typedef struct rc_rim {
+  int64_t face, zone, key[4]; /* zone: its node in the tree */
+} rc_rim;
+
 /* This rank's mesh while it grows. */
 typedef struct rc_mesh {
+  rc_array rim;         /* rc_rim */
   rc_array xyz;         /* double[3] */
   rc_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
   rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
@@ -264,7 +275,9 @@ struct rcgns_file {
   rc_array         bases, notes; /* const char *, in names */
   rcgns_zone_info *zone_info;
   rcgns_info       info;
-  int64_t         *solution; /* [num_zones] node of the chosen FlowSolution_t, -1 */
+  rc_array         boundary_name, boundary_type; /* const char *, in names */
+  int32_t         *face_boundary;                /* [faces of mesh] NULL before they are asked for */
+  int64_t         *solution;                     /* [num_zones] node of the chosen FlowSolution_t, -1 */
   rcgns_field     *field;
   int64_t          num_fields;
 };
@@ -287,6 +300,8 @@ rcgns_status rc_zones_find(rcgns_file *file, const char *base, rcgns_message *me
 void         rc_zones_drop(rcgns_file *file);
 /* Nodes of an element type as files of this version write it: *shape, and how many; 0: unknown. */
 int rc_element(double version, int64_t code, rc_shape *shape);
+/* Corners of a surface element of that type, 0: it is none. */
+int rc_surface_corners(double version, int64_t code);
 /* Corners of a shape. */
 int rc_corners(rc_shape shape);
 /* Rows [lo, hi) of a section that is not FIXED: offset [hi - lo + 1] and data, the type word of MIXED included, the count of
@@ -316,6 +331,8 @@ void         rc_mesh_drop(rc_mesh *mesh);
 void rc_mesh_view(rcgns_file *file);
 /* Are values of the nodes located at cells, for this file? */
 static inline bool rc_is_dual(const rcgns_file *file) { return file->location[0] == 'V'; }
+/* The face that was added last is at the rim. false: no memory. */
+bool rc_rim_add(rc_mesh *mesh, const rc_zone *zone, int64_t a, int64_t b, int64_t c, int64_t d);
 /* Six times the volume of the cone from origin to the loop, fanned about its mean. */
 double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin);
 

@@ -154,6 +154,8 @@ int64_t rc_map_add(rc_map *map, const int64_t *key)
   return map->slot[at];
 }
 
+int64_t rc_map_find(const rc_map *map, const int64_t *key) { return map->num_slots ? map->slot[slot_of(map, key)] : -1; }
+
 void rc_map_drop(rc_map *map)
 {
   rc_drop(&map->key);

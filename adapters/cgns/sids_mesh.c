@@ -41,6 +41,14 @@ bool rc_number_node(rcgns_file *file, const rc_zone *zone, int64_t node)
   return !rc_is_dual(file) || rc_push(&file->build.node_number, zone->first_node + node);
 }
 
+bool rc_rim_add(rc_mesh *mesh, const rc_zone *zone, int64_t a, int64_t b, int64_t c, int64_t d)
+{
+  if (!rc_reserve(&mesh->rim, 1, sizeof(rc_rim))) return false;
+  ((rc_rim *)mesh->rim.item)[mesh->rim.count++] =
+      (rc_rim){.face = mesh->face_owner.count - 1, .zone = zone->node, .key = {a, b, c, d}};
+  return true;
+}
+
 double rc_cone(const double *xyz, const int64_t *node, int64_t n, const double *origin)
 {
   double mean[3] = {0, 0, 0}, sum = 0.0;
@@ -195,6 +203,8 @@ static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int6
         loop[v] = base + ((at[2] + d[2] - p->k0) * p->rows + at[1] + d[1] - p->j0) * zone->vertices[0] + at[0] + d[0];
       }
       if (!rc_face_add(mesh, loop, 4, false, first_cell + c - lo, other < 0 ? -1 : first_cell + other - lo)) return false;
+      if (index >= 0 && index < n[a]) continue;
+      if (!rc_rim_add(mesh, zone, 2 * a + (step[f] > 0), at[0], at[1], at[2])) return false;
     }
   }
   return true;
@@ -488,8 +498,23 @@ static rcgns_status join(const rcgns_file *file, const rc_zone *zone, const elem
   return RCGNS_OK;
 }
 
+/* Nodes of these elements as nodes of the zone, ascending, then -1. */
+static void zone_key(const elements *e, const int64_t key[4], int64_t out[4])
+{
+  const int64_t *node = e->node.key.item;
+
+  for (int k = 0; k < 4; k++) out[k] = -1;
+  for (int k = 0; k < 4 && key[k] >= 0; k++) {
+    int at = k;
+
+    for (; at > 0 && out[at - 1] > node[key[k]]; at--) out[at] = out[at - 1];
+    out[at] = node[key[k]];
+  }
+}
+
 /* A side, or two that join, into the mesh. */
-static bool emit(rc_mesh *mesh, const elements *e, int64_t first_cell, int64_t lo, int64_t side, int64_t other)
+static bool emit(rc_mesh *mesh, const rc_zone *zone, const elements *e, int64_t first_cell, int64_t lo, int64_t side,
+                 int64_t other)
 {
   const int64_t *cell = e->cell.item;
   int64_t        loop[4], key[4], against[4];
@@ -498,10 +523,14 @@ static bool emit(rc_mesh *mesh, const elements *e, int64_t first_cell, int64_t l
   side_of(e, side / MAX_FACES, (int)(side % MAX_FACES), loop, &n, key);
   if (other >= 0) side_of(e, other / MAX_FACES, (int)(other % MAX_FACES), against, &m, key);
   if (other >= 0 && !is_opposite(loop, n, against, m))
-    return emit(mesh, e, first_cell, lo, side, -1) && emit(mesh, e, first_cell, lo, other, -1);
+    return emit(mesh, zone, e, first_cell, lo, side, -1) && emit(mesh, zone, e, first_cell, lo, other, -1);
   for (int i = 0; i < n; i++) loop[i] += e->base;
-  return rc_face_add(mesh, loop, n, false, first_cell + cell[side / MAX_FACES] - lo,
-                     other < 0 ? -1 : first_cell + cell[other / MAX_FACES] - lo);
+  if (!rc_face_add(mesh, loop, n, false, first_cell + cell[side / MAX_FACES] - lo,
+                   other < 0 ? -1 : first_cell + cell[other / MAX_FACES] - lo))
+    return false;
+  if (other >= 0) return true;
+  zone_key(e, key, against);
+  return rc_rim_add(mesh, zone, against[0], against[1], against[2], against[3]);
 }
 
 typedef struct claim {
@@ -521,17 +550,11 @@ static int by_key(const void *a, const void *b)
 static bool claim_of(const elements *e, const joints *j, int64_t set, claim *c)
 {
   const int64_t *key = (const int64_t *)j->set.key.item + 4 * set, *both = (const int64_t *)j->side.item + 2 * set;
-  const int64_t *node = e->node.key.item;
 
-  *c = (claim){
-      .key = {-1, -1, -1, -1}, .cell = ((const int64_t *)e->cell.item)[both[0] / MAX_FACES], .sides = both[1] < 0 ? 1 : 2};
-  for (int k = 0; k < 4 && key[k] >= 0; k++) {
-    int at = k;
-
+  *c = (claim){.cell = ((const int64_t *)e->cell.item)[both[0] / MAX_FACES], .sides = both[1] < 0 ? 1 : 2};
+  for (int k = 0; k < 4 && key[k] >= 0; k++)
     if (!e->shared[key[k]]) return false;
-    for (; at > 0 && c->key[at - 1] > node[key[k]]; at--) c->key[at] = c->key[at - 1];
-    c->key[at] = node[key[k]];
-  }
+  zone_key(e, key, c->key);
   return true;
 }
 
@@ -591,8 +614,8 @@ static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elemen
       bool           ok = true;
 
       for (int64_t s = 0; s < j.set.key.count && ok; s++)
-        ok = emit(&file->build, e, first_cell, lo, side[2 * s], side[2 * s + 1]);
-      for (int64_t s = 0; s < j.alone.count && ok; s++) ok = emit(&file->build, e, first_cell, lo, alone[s], -1);
+        ok = emit(&file->build, zone, e, first_cell, lo, side[2 * s], side[2 * s + 1]);
+      for (int64_t s = 0; s < j.alone.count && ok; s++) ok = emit(&file->build, zone, e, first_cell, lo, alone[s], -1);
       status = rc_agree(file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
     }
   }

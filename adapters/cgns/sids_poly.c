@@ -555,7 +555,7 @@ static int64_t distinct(const int64_t *loop, int64_t n)
   return count;
 }
 
-static bool emit(rc_mesh *mesh, const polys *p, int64_t first_cell)
+static bool emit(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t first_cell)
 {
   const int64_t *sign = p->sign.item, *ref = p->ref.item;
   bool           ok = true;
@@ -570,7 +570,8 @@ static bool emit(rc_mesh *mesh, const polys *p, int64_t first_cell)
       ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), first_cell + cell_of(p, b));
       continue;
     }
-    ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), -1);
+    ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), -1) &&
+         rc_rim_add(mesh, zone, number_of(zone, ints_of(&p->faces.key)[f]), -1, -1, -1);
     if (ok && b >= 0) ok = rc_face_add(mesh, loop, n, sign[b] < 0, first_cell + cell_of(p, b), -1);
   }
   return ok;
@@ -586,7 +587,7 @@ static rcgns_status build(rcgns_file *file, const rc_zone *zone, polys *p, int64
   RC_TRY(fetch_loops(file, zone, p, message));
   RC_TRY(locate(file, zone, p, message));
   status = repair_signs(file, p, &repaired, message);
-  if (status == RCGNS_OK && !emit(&file->build, p, first_cell)) status = rc_no_memory(message);
+  if (status == RCGNS_OK && !emit(&file->build, zone, p, first_cell)) status = rc_no_memory(message);
   RC_TRY(rc_agree(file->comm, status, message));
   any = repaired;
   MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT64_T, MPI_MAX, file->comm);

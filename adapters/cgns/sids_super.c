@@ -1,5 +1,5 @@
-/* sids_super -- a supermesh as a file: one zone of polyhedra with NGON_n and NFACE_n, boundary conditions on its outer faces, and
- * its ancestors and fields as cell-centred values. Each rank writes its slices; linear in them. */
+/* sids_super -- a supermesh as a file: one zone of polyhedra with NGON_n and NFACE_n, boundary conditions on its outer faces,
+ * and its ancestors and fields as cell-centred values. Each rank writes its slices; linear in them. */
 #include "cgns_private.h"
 
 #include <stdio.h>
@@ -131,7 +131,8 @@ static int64_t put_section(sheet *s, const char *name, int64_t code, int64_t fir
   return at;
 }
 
-/* Contents of rows after `head` words each, made numbers of CGNS by adding 1 to what is not signed yet, and where they begin. */
+/* Contents of rows after `head` words each, made numbers of CGNS by adding 1 to what is not signed yet, and where they begin.
+ * */
 static void put_rows(sheet *s, int64_t parent, const rslice_rows *r, int64_t head, int add, int which, int64_t total_rows,
                      int64_t most)
 {

@@ -50,6 +50,25 @@ int rc_element(double version, int64_t code, rc_shape *shape)
   return nodes[c];
 }
 
+int rc_surface_corners(double version, int64_t code)
+{
+  static const char corners[MAX_CODE + 2] = "....."
+                                            "33444"
+                                            "....."
+                                            "....."
+                                            "....."
+                                            "33444"
+                                            "....."
+                                            "....."
+                                            "."
+                                            "33444";
+  rc_shape          shape;
+  const int64_t     c = modern_code(version, code);
+
+  (void)rc_element(version, code, &shape);
+  return c < 0 || c > MAX_CODE || corners[c] == '.' ? 0 : corners[c] - '0';
+}
+
 /* Nodes of a row of MIXED: an element or, in old files, a polygon whose code says how many. 0: unknown. */
 static int64_t mixed_nodes(double version, int64_t code, rc_shape *shape)
 {

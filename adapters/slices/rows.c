@@ -1,5 +1,6 @@
-/* rows -- nodes, faces and cells of a supermesh as rows of words. What is written of a face or cell does not depend on the rank that
- * has it: faces point out of their lower cell, loops begin at their lowest node, the faces of a cell ascend. Linear. */
+/* rows -- nodes, faces and cells of a supermesh as rows of words. What is written of a face or cell does not depend on the
+ * rank that has it: faces point out of their lower cell, loops begin at their lowest node, the faces of a cell ascend. Linear.
+ * */
 #include "slices.h"
 
 #include <stdbool.h>

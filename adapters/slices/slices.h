@@ -1,10 +1,10 @@
 /** @file
- * slices.h -- what the writers of supermeshes share: rows of global arrays brought to the ranks that write them, and files that
- * appear when they are complete.
+ * slices.h -- what the writers of supermeshes share: rows of global arrays brought to the ranks that write them, and
+ * files that appear when they are complete.
  *
- * A global array of n rows is written in slices: rank r has the rows from rslice_begin(n, r, size) up to that of rank r + 1. The
- * rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that is written
- * in their order, whatever the number of ranks. No rank ever holds more than its slices and its own part. */
+ * A global array of n rows is written in slices: rank r has the rows from rslice_begin(n, r, size) up to that of rank r + 1.
+ * The rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that is
+ * written in their order, whatever the number of ranks. No rank ever holds more than its slices and its own part. */
 #ifndef REMAP_ADAPTERS_SLICES_H
 #define REMAP_ADAPTERS_SLICES_H
 
@@ -63,9 +63,9 @@ typedef struct rslice_rows {
 /** First of n rows that a rank writes; rank == size gives n. Slices differ by one row at most. Not collective. */
 int64_t rslice_begin(int64_t n, int rank, int size);
 
-/** Bring rows to their slices. global [num] are the numbers of the rows that this rank has, word[offset[i] .. offset[i + 1]) row
- *  i. A row may come from several ranks: they give the same words. mine is the caller's own status so far, so that a rank in
- *  trouble takes the others with it. Collective on comm. Errors: those of the list; *out is then empty. */
+/** Bring rows to their slices. global [num] are the numbers of the rows that this rank has, word[offset[i] .. offset[i + 1])
+ *  row i. A row may come from several ranks: they give the same words. mine is the caller's own status so far, so that a rank
+ *  in trouble takes the others with it. Collective on comm. Errors: those of the list; *out is then empty. */
 rslice_status rslice_ship(MPI_Comm comm, rslice_status mine, int64_t total, int64_t num, const int64_t *global,
                           const int64_t *offset, const int64_t *word, rslice_rows *out);
 
@@ -75,18 +75,18 @@ void rslice_drop(rslice_rows *rows);
 /** The nodes' coordinates: rows of 3 words, doubles bit by bit. Collective. */
 rslice_status rslice_nodes(MPI_Comm comm, const remap_supermesh_view *mesh, rslice_rows *out);
 
-/** The faces: rows {owner, neighbour or -1, boundary or -1, nodes ...}, all global numbers; the normal points out of the owner, which
- *  is the lower cell; the loop begins at its lowest node. Collective. */
+/** The faces: rows {owner, neighbour or -1, boundary or -1, nodes ...}, all global numbers; the normal points out of the
+ *  owner, which is the lower cell; the loop begins at its lowest node. Collective. */
 rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_rows *out);
 
-/** The cells: rows {ancestors, volume, fields ..., then their faces}; ancestors as in their fields, numbers bit by bit. Faces are
- *  +-(global number + 1), negative where the normal points into the cell, ascending; or, with loops, they are written out for
- *  VTK: {how many, then for each: how many nodes, nodes ...}, normals pointing out. Collective. */
+/** The cells: rows {ancestors, volume, fields ..., then their faces}; ancestors as in their fields, numbers bit by bit. Faces
+ *  are +-(global number + 1), negative where the normal points into the cell, ascending; or, with loops, they are written out
+ *  for VTK: {how many, then for each: how many nodes, nodes ...}, normals pointing out. Collective. */
 rslice_status rslice_cells(MPI_Comm comm, const rslice_content *content, int with_loops, rslice_rows *out);
 /** Words of such a row before the faces. Not collective. */
 int64_t rslice_cell_head(const rslice_content *content);
 
-/** A new, empty file beside `path`, to be given that name later; its own goes to part. One rank calls. 0, or an error number. */
+/** A new, empty file beside `path`, that is to get its name; its own goes to part. One rank calls. 0, or an error number. */
 int rslice_file_begin(const char *path, char *part, size_t size);
 /** Claim so many bytes of disk, so that later writes cannot find it full. One rank calls. 0, or an error number. */
 int rslice_file_claim(const char *part, int64_t bytes);

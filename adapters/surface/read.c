@@ -97,6 +97,32 @@ rsurf_status rs_face(rs_input *in, const int64_t *node, int64_t n)
   return ok ? RSURF_OK : rs_no_memory(in->message);
 }
 
+/* What was read becomes a surface. */
+static void hand_over(rs_input *in, rsurf_surface *out)
+{
+  *out               = (rsurf_surface){.num_nodes   = in->nodes.key.count,
+                                       .num_faces   = in->group.count,
+                                       .num_groups  = (int32_t)in->names.count,
+                                       .node_xyz    = in->nodes.key.item,
+                                       .face_offset = in->offset.item,
+                                       .face_node   = in->loop.item,
+                                       .face_group  = in->group.item,
+                                       .group_name  = in->names.item};
+  in->nodes.key.item = in->offset.item = in->loop.item = in->group.item = in->names.item = NULL;
+  in->names.count                                                                        = 0;
+}
+
+static void drop_input(rs_input *in)
+{
+  for (int64_t i = 0; i < in->names.count; i++) free(((char **)in->names.item)[i]);
+  free(in->names.item);
+  free(in->offset.item);
+  free(in->loop.item);
+  free(in->group.item);
+  rs_map_drop(&in->nodes);
+  free(in->text);
+}
+
 rsurf_status rsurf_read(const char *path, double scale, rsurf_surface *out, rsurf_message *message)
 {
   rs_input      in   = {.path = path, .scale = scale, .nodes = {.width = 3}, .current = -1, .message = message};
@@ -107,27 +133,70 @@ rsurf_status rsurf_read(const char *path, double scale, rsurf_surface *out, rsur
   RS_GOTO(done, status = load(&in));
   RS_GOTO(done, status = rs_push(&in.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message));
   RS_GOTO(done, status = ends_in(path, ".stl") ? rs_read_stl(&in) : rs_read_obj(&in));
-  if (!in.group.count) {
+  if (in.group.count)
+    hand_over(&in, out);
+  else
     status = rs_fail(message, RSURF_IO, "%s: it holds no faces: give an STL or OBJ file of a closed surface", path);
-    goto done;
-  }
-  *out              = (rsurf_surface){.num_nodes   = in.nodes.key.count,
-                                      .num_faces   = in.group.count,
-                                      .num_groups  = (int32_t)in.names.count,
-                                      .node_xyz    = in.nodes.key.item,
-                                      .face_offset = in.offset.item,
-                                      .face_node   = in.loop.item,
-                                      .face_group  = in.group.item,
-                                      .group_name  = in.names.item};
-  in.nodes.key.item = in.offset.item = in.loop.item = in.group.item = in.names.item = NULL;
-  in.names.count                                                                    = 0;
 done:
-  for (int64_t i = 0; i < in.names.count; i++) free(((char **)in.names.item)[i]);
-  free(in.names.item);
-  free(in.offset.item);
-  free(in.loop.item);
-  free(in.group.item);
-  rs_map_drop(&in.nodes);
-  free(in.text);
+  drop_input(&in);
   return status;
+}
+
+/* ---- from polygons ------------------------------------------------------------------------------------------------- */
+
+struct rsurf_builder {
+  rs_input in;
+  rs_array loop; /* int64_t: of the face that is added */
+};
+
+rsurf_status rsurf_begin(int32_t num_groups, const char *const *group_name, rsurf_builder **out, rsurf_message *message)
+{
+  rsurf_builder *b    = rs_alloc(1, sizeof *b);
+  const int64_t  zero = 0;
+  bool           ok   = b != NULL;
+
+  if (b) b->in = (rs_input){.path = "the surface", .scale = 1, .nodes = {.width = 3}, .message = message};
+  ok = ok && rs_push(&b->in.offset, &zero, sizeof zero);
+  for (int32_t g = 0; g < num_groups && ok; g++) {
+    char *copy = strdup(group_name[g]);
+
+    ok = copy && rs_push(&b->in.names, &copy, sizeof copy);
+    if (!ok) free(copy);
+  }
+  if (!ok) {
+    rsurf_surface none;
+
+    rsurf_end(&b, &none);
+    rsurf_drop(&none);
+    return rs_no_memory(message);
+  }
+  *out = b;
+  return RSURF_OK;
+}
+
+rsurf_status rsurf_add(rsurf_builder *b, const double *xyz, int64_t n, int32_t group, rsurf_message *message)
+{
+  b->in.message = message;
+  b->in.current = group;
+  b->loop.count = 0;
+  for (int64_t i = 0; i < n; i++) {
+    int64_t node;
+
+    RS_TRY(rs_node(&b->in, xyz + 3 * i, "face", b->in.group.count + 1, &node));
+    if (!rs_push(&b->loop, &node, sizeof node)) return rs_no_memory(message);
+  }
+  return rs_face(&b->in, b->loop.item, n);
+}
+
+void rsurf_end(rsurf_builder **builder, rsurf_surface *out)
+{
+  rsurf_builder *b = *builder;
+
+  *out = (rsurf_surface){.num_nodes = 0};
+  if (!b) return;
+  hand_over(&b->in, out);
+  drop_input(&b->in);
+  free(b->loop.item);
+  free(b);
+  *builder = NULL;
 }

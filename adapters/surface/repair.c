@@ -147,6 +147,16 @@ static bool add_face(faces *to, const int64_t *loop, int64_t n, int32_t group)
   return ok && rs_push(&to->offset, &to->loop.count, sizeof to->loop.count) && rs_push(&to->group, &group, sizeof group);
 }
 
+/* What stands in loop from `first` on are triangles. */
+static bool end_triangles(faces *to, int64_t first, int32_t group)
+{
+  bool ok = true;
+
+  for (int64_t end = first + 3; end <= to->loop.count && ok; end += 3)
+    ok = rs_push(&to->offset, &end, sizeof end) && rs_push(&to->group, &group, sizeof group);
+  return ok;
+}
+
 static rsurf_status refuse_face(const rsurf_surface *s, const char *name, int64_t face, const char *what,
                                 rsurf_message *message)
 {
@@ -181,10 +191,25 @@ static rsurf_status clean_face(const rsurf_surface *s, const double *xyz, const 
 
     to->cut++;
     if (!clip_ears(xyz, loop, m, &to->loop, &memory)) return refuse_face(s, name, f, "crosses itself", message);
-    for (int64_t end = first + 3; end <= to->loop.count && memory; end += 3)
-      memory = rs_push(&to->offset, &end, sizeof end) && rs_push(&to->group, &s->face_group[f], sizeof *s->face_group);
+    memory = memory && end_triangles(to, first, s->face_group[f]);
   }
   return memory ? RSURF_OK : rs_no_memory(message);
+}
+
+/* The faces take the place of the surface's, or end where something failed. */
+static void replace(rsurf_surface *s, faces *to, rsurf_status status)
+{
+  const rsurf_surface old = *s;
+
+  if (status == RSURF_OK) {
+    s->num_faces   = to->group.count;
+    s->face_offset = to->offset.item;
+    s->face_node   = to->loop.item;
+    s->face_group  = to->group.item;
+  }
+  free(status == RSURF_OK ? old.face_offset : to->offset.item);
+  free(status == RSURF_OK ? old.face_node : to->loop.item);
+  free(status == RSURF_OK ? old.face_group : to->group.item);
 }
 
 static rsurf_status clean_faces(rsurf_surface *s, const double *xyz, const char *name, rsurf_repairs *repairs,
@@ -195,23 +220,48 @@ static rsurf_status clean_faces(rsurf_surface *s, const double *xyz, const char 
   rsurf_status  status = rs_push(&to.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message);
 
   for (int64_t f = 0; f < s->num_faces && status == RSURF_OK; f++) status = clean_face(s, xyz, name, f, &to, message);
-  if (status != RSURF_OK) {
-    free(to.offset.item);
-    free(to.loop.item);
-    free(to.group.item);
-    return status;
-  }
-  free(s->face_offset);
-  free(s->face_node);
-  free(s->face_group);
-  s->num_faces           = to.group.count;
-  s->face_offset         = to.offset.item;
-  s->face_node           = to.loop.item;
-  s->face_group          = to.group.item;
+  replace(s, &to, status);
+  if (status != RSURF_OK) return status;
   repairs->faces_cut     = to.cut;
   repairs->faces_dropped = to.dropped;
   if (!s->num_faces) return rs_fail(message, RSURF_GEOMETRY, "%s: all its faces lie in points or lines: give a surface", name);
   return RSURF_OK;
+}
+
+/* The triangles of a polygon; a fan where rounding has made it cross itself. */
+static bool cut_face(const rsurf_surface *s, const double *xyz, int64_t f, faces *to)
+{
+  const int64_t  n = s->face_offset[f + 1] - s->face_offset[f], first = to->loop.count;
+  const int64_t *face = s->face_node + s->face_offset[f];
+  int64_t       *loop = rs_alloc(n, sizeof *loop);
+  bool           ok   = loop != NULL;
+
+  if (ok) memcpy(loop, face, (size_t)n * sizeof *loop);
+  if (ok && !clip_ears(xyz, loop, n, &to->loop, &ok)) {
+    to->loop.count = first;
+    for (int64_t i = 1; i + 1 < n && ok; i++)
+      ok = rs_push(&to->loop, &face[0], sizeof *face) && rs_push(&to->loop, &face[i], sizeof *face) &&
+           rs_push(&to->loop, &face[i + 1], sizeof *face);
+  }
+  free(loop);
+  return ok && end_triangles(to, first, s->face_group[f]);
+}
+
+rsurf_status rsurf_triangulate(rsurf_surface *s, rsurf_message *message)
+{
+  faces         to   = {.cut = 0};
+  double       *xyz  = unit_coordinates(s);
+  const int64_t zero = 0;
+  bool          ok   = xyz && rs_push(&to.offset, &zero, sizeof zero);
+
+  for (int64_t f = 0; f < s->num_faces && ok; f++) {
+    const int64_t n = s->face_offset[f + 1] - s->face_offset[f];
+
+    ok = n == 3 ? add_face(&to, s->face_node + s->face_offset[f], 3, s->face_group[f]) : cut_face(s, xyz, f, &to);
+  }
+  replace(s, &to, ok ? RSURF_OK : RSURF_MEMORY);
+  free(xyz);
+  return ok ? RSURF_OK : rs_no_memory(message);
 }
 
 /* ---- edges ----------------------------------------------------------------------------------------------------------- */

@@ -3,6 +3,8 @@
  *
  *   rsurf_read      a file's faces as they stand, nodes joined by equal coordinates
  *   rsurf_repair    faces of one orientation, shells outward, or the reason why that cannot be
+ *   rsurf_begin     a surface from polygons: rsurf_add, rsurf_end
+ *   rsurf_triangulate   polygons into triangles
  *   rsurf_write     faces into an STL (text) or OBJ file
  *   rsurf_drop      give everything back
  *
@@ -91,6 +93,20 @@ rsurf_status rsurf_repair(rsurf_surface *surface, const char *name, rsurf_repair
 
 /** A repaired surface as remap_set_mesh wants it, a cell for each body: a view of the surface. */
 remap_mesh rsurf_mesh(const rsurf_surface *surface, const char *name);
+
+/** A surface that grows. Opaque. */
+typedef struct rsurf_builder rsurf_builder;
+
+/** Begin a surface with these groups, which are copied. The caller ends *out with rsurf_end. Errors: MEMORY. */
+rsurf_status rsurf_begin(int32_t num_groups, const char *const *group_name, rsurf_builder **out, rsurf_message *message);
+/** Add a polygon of n corners, xyz [n][3], to a group. Corners in one place become one node. Errors: IO (a coordinate that is
+ *  no finite number), MEMORY. */
+rsurf_status rsurf_add(rsurf_builder *builder, const double *xyz, int64_t n, int32_t group, rsurf_message *message);
+/** End it: the faces become *out, and *builder NULL. Harmless on NULL: an empty surface. */
+void rsurf_end(rsurf_builder **builder, rsurf_surface *out);
+
+/** Cut every polygon into triangles on its own corners, none without area where that can be. Errors: MEMORY. */
+rsurf_status rsurf_triangulate(rsurf_surface *surface, rsurf_message *message);
 
 /** Write a surface as text with all digits, STL (triangles only) or OBJ by the ending of `path`, to `out`, which the
  *  caller opens and closes. Errors: USAGE (a polygon cannot be written as STL, or another ending), IO. */

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static void write_facet(FILE *out, const rsurf_surface *s, int64_t f)
@@ -25,47 +26,67 @@ static void write_facet(FILE *out, const rsurf_surface *s, int64_t f)
   fputs(" endloop\nendfacet\n", out);
 }
 
-/* The faces of each group in a solid of its own. */
-static rsurf_status write_stl(FILE *out, const char *path, const rsurf_surface *s, rsurf_message *message)
+/* The faces in the order of their groups; first [num_groups + 1] says where each begins. The caller frees; NULL: no memory. */
+static int64_t *by_group(const rsurf_surface *s, int64_t **first)
+{
+  int64_t *face = rs_alloc(s->num_faces, sizeof *face), *at = rs_alloc(s->num_groups + 2, sizeof *at);
+
+  for (int64_t f = 0; face && at && f < s->num_faces; f++) at[s->face_group[f] + 2]++;
+  for (int32_t g = 0; face && at && g < s->num_groups; g++) at[g + 2] += at[g + 1];
+  for (int64_t f = 0; face && at && f < s->num_faces; f++) face[at[s->face_group[f] + 1]++] = f;
+  if (!face || !at) {
+    free(face);
+    free(at);
+    return NULL;
+  }
+  *first = at;
+  return face;
+}
+
+static void write_polygon(FILE *out, const rsurf_surface *s, int64_t f)
+{
+  fputc('f', out);
+  for (int64_t i = s->face_offset[f]; i < s->face_offset[f + 1]; i++) fprintf(out, " %lld", (long long)s->face_node[i] + 1);
+  fputc('\n', out);
+}
+
+/* Groups with faces, one after the other: solids of STL, groups of OBJ. */
+static rsurf_status write_groups(FILE *out, const rsurf_surface *s, bool is_stl, rsurf_message *message)
+{
+  int64_t *first, *face = by_group(s, &first);
+
+  if (!face) return rs_no_memory(message);
+  for (int32_t g = 0; g < s->num_groups; g++) {
+    if (first[g] == first[g + 1]) continue;
+    fprintf(out, "%s %s\n", is_stl ? "solid" : "g", s->group_name[g]);
+    for (int64_t i = first[g]; i < first[g + 1]; i++) (is_stl ? write_facet : write_polygon)(out, s, face[i]);
+    if (is_stl) fprintf(out, "endsolid %s\n", s->group_name[g]);
+  }
+  free(face);
+  free(first);
+  return RSURF_OK;
+}
+
+static rsurf_status check_triangles(const char *path, const rsurf_surface *s, rsurf_message *message)
 {
   for (int64_t f = 0; f < s->num_faces; f++)
     if (s->face_offset[f + 1] - s->face_offset[f] != 3)
       return rs_fail(message, RSURF_USAGE, "%s: a polygon of %lld corners cannot be written as STL: write OBJ", path,
                      (long long)(s->face_offset[f + 1] - s->face_offset[f]));
-  for (int32_t g = 0; g < s->num_groups; g++) {
-    fprintf(out, "solid %s\n", s->group_name[g]);
-    for (int64_t f = 0; f < s->num_faces; f++)
-      if (s->face_group[f] == g) write_facet(out, s, f);
-    fprintf(out, "endsolid %s\n", s->group_name[g]);
-  }
   return RSURF_OK;
-}
-
-static void write_obj(FILE *out, const rsurf_surface *s)
-{
-  for (int64_t i = 0; i < s->num_nodes; i++)
-    fprintf(out, "v %.17g %.17g %.17g\n", s->node_xyz[3 * i], s->node_xyz[3 * i + 1], s->node_xyz[3 * i + 2]);
-  for (int32_t g = 0; g < s->num_groups; g++) {
-    fprintf(out, "g %s\n", s->group_name[g]);
-    for (int64_t f = 0; f < s->num_faces; f++) {
-      if (s->face_group[f] != g) continue;
-      fputc('f', out);
-      for (int64_t i = s->face_offset[f]; i < s->face_offset[f + 1]; i++) fprintf(out, " %lld", (long long)s->face_node[i] + 1);
-      fputc('\n', out);
-    }
-  }
 }
 
 rsurf_status rsurf_write(FILE *out, const char *path, const rsurf_surface *surface, rsurf_message *message)
 {
-  const size_t n = strlen(path);
+  const size_t n      = strlen(path);
+  const bool   is_stl = n && (path[n - 1] == 'l' || path[n - 1] == 'L');
 
   message->text[0] = 0;
   if (!rsurf_is_path(path)) return rs_fail(message, RSURF_USAGE, "%s: a surface is written as .stl or .obj: rename it", path);
-  if (path[n - 1] == 'l' || path[n - 1] == 'L')
-    RS_TRY(write_stl(out, path, surface, message));
-  else
-    write_obj(out, surface);
+  if (is_stl) RS_TRY(check_triangles(path, surface, message));
+  for (int64_t i = 0; i < surface->num_nodes && !is_stl; i++)
+    fprintf(out, "v %.17g %.17g %.17g\n", surface->node_xyz[3 * i], surface->node_xyz[3 * i + 1], surface->node_xyz[3 * i + 2]);
+  RS_TRY(write_groups(out, surface, is_stl, message));
   return fflush(out) || ferror(out) ? rs_fail(message, RSURF_IO, "%s: it cannot be written: is the disk full?", path)
                                     : RSURF_OK;
 }

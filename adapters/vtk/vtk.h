@@ -3,8 +3,8 @@
  *
  *   rvtk_write     a .vtu file, by all ranks together     (collective)
  *
- * The file is XML with appended raw data: UInt64 lengths, Int64 indices, Float64 numbers, in the byte order of the machine. Cell
- * data are the two ancestors, the volume and the fields. No function prints or exits. */
+ * The file is XML with appended raw data: UInt64 lengths, Int64 indices, Float64 numbers, in the byte order of the machine.
+ * Cell data are the two ancestors, the volume and the fields. No function prints or exits. */
 #ifndef REMAP_ADAPTERS_VTK_H
 #define REMAP_ADAPTERS_VTK_H
 
@@ -40,9 +40,9 @@ const char *rvtk_status_text(rvtk_status status);
 /** Does the name end in .vtu, in letters of any size? Not collective. */
 int rvtk_is_path(const char *path);
 
-/** Write the supermesh to `path`, which appears when it is complete and is replaced if it exists. The bytes do not depend on the
- *  number of ranks. Boundaries are left out: the format has cells only. message, never NULL, holds one line after a failure.
- *  Collective on comm. Errors: IO, MEMORY, INTERNAL. */
+/** Write the supermesh to `path`, which appears when it is complete and is replaced if it exists. The bytes do not depend on
+ *  the number of ranks. Boundaries are left out: the format has cells only. message, never NULL, holds one line after a
+ *  failure. Collective on comm. Errors: IO, MEMORY, INTERNAL. */
 rvtk_status rvtk_write(MPI_Comm comm, const char *path, const rslice_content *content, rvtk_message *message);
 
 #ifdef __cplusplus

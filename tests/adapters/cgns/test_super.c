@@ -1,4 +1,5 @@
-/* Supermeshes as CGNS files: the same bytes on any number of ranks, what was put in comes out, and nothing else is left behind. */
+/* Supermeshes as CGNS files: the same bytes on any number of ranks, what was put in comes out, and nothing else is left
+ * behind. */
 #include "files.h"
 
 #include "../slices/blocks.h"

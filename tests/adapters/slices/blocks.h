@@ -4,8 +4,8 @@
  *   rvtk_write(comm, path, &b->content, &message);
  *   bl_free(b);
  *
- * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. A field "Number" holds 1.5 c, six boundaries are
- * the sides. Memory that runs out ends the program. */
+ * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. A field "Number" holds 1.5 c, six boundaries
+ * are the sides. Memory that runs out ends the program. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
 

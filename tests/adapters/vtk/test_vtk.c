@@ -96,7 +96,8 @@ static void vtk_reads_polyhedra_of_the_right_volume(void)
   if (rt_rank() == 0 && !none) {
     snprintf(
         command, sizeof command,
-        "/usr/bin/python3 -c 'import vtkmodules.vtkIOXML as x\nfrom vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter as F\n"
+        "/usr/bin/python3 -c 'import vtkmodules.vtkIOXML as x\n"
+             "from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter as F\n"
         "r = x.vtkXMLUnstructuredGridReader()\nr.SetFileName(\"%s\")\nf = F()\nf.SetInputConnection(r.GetOutputPort())\n"
         "f.Update()\ng = f.GetOutput()\nv = g.GetCellData().GetArray(\"Volume\")\na = g.GetCellData().GetArray(\"AncestorA\")\n"
         "assert g.GetNumberOfCells() == 24 and g.GetNumberOfPoints() == 60\n"

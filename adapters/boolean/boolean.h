@@ -1,0 +1,173 @@
+/* boolean.h -- what the files of the remap-boolean command share: how it can end, what was asked for, the operands, the result.
+ *
+ *   main.c      the job: open, make the supermesh, write, report
+ *   options.c   the command line
+ *   operand.c   a CGNS mesh or a closed surface as an operand, with the names of its boundaries and its fields
+ *   output.c    the result as CGNS, VTK, STL or OBJ
+ *   report.c    text for people, JSON for programs
+ *
+ * Standard output gets the report and the progress, standard error one line per failure and nothing else. */
+#ifndef REMAP_BOOLEAN_H
+#define REMAP_BOOLEAN_H
+
+#include <cgns.h>
+#include <mpi.h>
+#include <remap/remap.h>
+#include <slices.h>
+#include <surface.h>
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+/** Every exit status: name, number, text for --help. The greater one wins when ranks differ. */
+#define BOOL_EXIT_LIST(X)                                                                \
+  X(DONE, 0, "done")                                                                     \
+  X(USAGE, 2, "usage")                                                                   \
+  X(EMPTY, 3, "the result has no cells; OUT is not written")                             \
+  X(IO, 5, "input or output")                                                            \
+  X(GEOMETRY, 6, "a mesh is broken; a surface is open, not manifold, or crosses itself") \
+  X(INTERNAL, 7, "memory, MPI or an internal check")
+
+typedef enum bool_exit {
+#define X(name, number, text) BOOL_##name = number,
+  BOOL_EXIT_LIST(X)
+#undef X
+} bool_exit;
+
+/** Every operation: word, REMAP_IN_ bits, text for --help. A is the source, B the target. */
+#define BOOL_OPERATION_LIST(X)                                                            \
+  X("intersection", REMAP_IN_BOTH, "what lies in A and in B")                             \
+  X("union", REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET, "what lies in A or in B") \
+  X("difference", REMAP_IN_SOURCE, "A without B")                                         \
+  X("rdifference", REMAP_IN_TARGET, "B without A")                                        \
+  X("imprint", REMAP_IN_BOTH | REMAP_IN_SOURCE, "all of A, cut where B's faces go through it")
+
+/** Why a step failed: one line without a newline, the same on every rank. */
+typedef struct bool_failure {
+  char text[1400];
+} bool_failure;
+
+/** Fill in *why in the manner of printf and hand code back. Not collective. */
+bool_exit bool_fail(bool_failure *why, bool_exit code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+
+/** INTERNAL, with the words for it. Not collective. */
+bool_exit bool_no_memory(bool_failure *why);
+
+/** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
+bool_exit bool_agree(MPI_Comm comm, bool_exit mine, bool_failure *why);
+
+/** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
+bool_exit bool_from_cgns(rcgns_status status, const rcgns_message *message, bool_failure *why);
+
+/** Hand a failure up; only where nothing is owned. */
+#define BOOL_TRY(call)                            \
+  do {                                            \
+    const bool_exit bool_try_ = (call);           \
+    if (bool_try_ != BOOL_DONE) return bool_try_; \
+  } while (0)
+
+/* ---- options ------------------------------------------------------------------------------------------------------- */
+
+/** What was asked for. Texts point into argv; NULL where an option was not given. */
+typedef struct bool_options {
+  const char *operation; /**< its word */
+  int         keep;      /**< its REMAP_IN_ bits */
+  const char *path[2];   /**< A, B */
+  const char *output, *report;
+  const char *fields;   /**< names and globs, comma separated */
+  const char *solution; /**< of both operands */
+  const char *base[2];
+  double      scale; /**< of B's coordinates */
+  remap_faces faces;
+  bool        aggregate, split, quiet, verbose, help, version;
+} bool_options;
+
+/** Read the command line. With --help or --version nothing else is demanded. The same on all ranks; not collective.
+ *  Errors: USAGE. */
+bool_exit bool_options_parse(int argc, char **argv, bool_options *out, bool_failure *why);
+
+/** What --help prints. Not collective. */
+void bool_options_help(FILE *out);
+
+/* ---- operands ------------------------------------------------------------------------------------------------------ */
+
+/** One operand, opened. Owned: bool_operand_close. All zero is none. */
+typedef struct bool_operand {
+  const char        *path;
+  bool               is_surface;
+  rcgns_file        *file;      /**< NULL for a surface */
+  rcgns_solution     solution;  /**< its name is NULL if there is none */
+  rsurf_surface      surface;   /**< on rank 0 */
+  rsurf_repairs      repairs;   /**< the same on every rank */
+  remap_mesh         mesh;      /**< this rank's part */
+  int64_t            num_cells; /**< of all ranks */
+  int                num_boundaries;
+  const char *const *boundary_name; /**< [num_boundaries] the same on every rank */
+  const char *const *boundary_type; /**< [num_boundaries] NULL for a surface */
+  const int32_t     *face_boundary; /**< [faces of this rank] -1: none */
+  char             **own_name;      /**< behind boundary_name, of a surface */
+} bool_operand;
+
+/** Open operand number side (0: A, 1: B): by its ending a surface, else CGNS. Collective. Errors: USAGE, IO, GEOMETRY,
+ *  INTERNAL. */
+bool_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, bool_failure *why);
+
+/** Give everything back. Collective, and harmless on none. */
+void bool_operand_close(bool_operand *operand);
+
+/** Fields and boundaries of the result, taken over from both operands. Owned: bool_content_drop. */
+typedef struct bool_content {
+  rslice_content content;
+  rslice_field  *field;  /**< content.field */
+  double        *values; /**< behind them */
+  const char   **boundary_name, **boundary_type;
+  int32_t       *face_boundary;
+} bool_content;
+
+/** Take over what the cells and faces of the operands have. A field that both have is A's in the cells of A, else B's; a cell
+ *  without a value gets NaN. A face that lies in faces of both belongs to A's boundary. Collective. Errors: USAGE (a field that
+ *  neither has), IO, INTERNAL. */
+bool_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                            const remap_supermesh_view *view, bool_content *out, bool_failure *why);
+void      bool_content_drop(bool_content *content);
+
+/* ---- output -------------------------------------------------------------------------------------------------------- */
+
+/** Refuse an output that cannot be right: an input, something that is no regular file, a place that cannot be written. Nothing
+ *  is changed. Collective. Errors: USAGE, IO. */
+bool_exit bool_output_check(MPI_Comm comm, const bool_options *options, bool_failure *why);
+
+/** Write the result by the ending of the output's name; it appears when it is complete. Collective. Errors: USAGE, IO,
+ *  INTERNAL. */
+bool_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, bool_failure *why);
+
+/* ---- report -------------------------------------------------------------------------------------------------------- */
+
+/** Everything there is to tell. */
+typedef struct bool_report {
+  int                  ranks;
+  const bool_options  *options;
+  const bool_operand  *operand;  /**< [2] */
+  const bool_content  *content;  /**< NULL before it is made */
+  remap_supermesh_view view;     /**< counts of all ranks and seconds of the slowest; arrays are not read */
+  int64_t              cells[3]; /**< in both, in A only, in B only */
+  double               volume[3];
+  double               seconds_read, seconds_supermesh, seconds_write, seconds_total; /**< wall clock, slowest rank */
+  char                 part[4096]; /**< on rank 0: the name that the report has until it is complete; empty: there is none */
+  int64_t              peak_rss;   /**< bytes of the rank that needs most */
+} bool_report;
+
+/** Count cells and volumes over all ranks. Collective. */
+void bool_report_count(MPI_Comm comm, const remap_supermesh_view *view, bool_report *report);
+/** Text for people. One rank calls. */
+void bool_report_print(FILE *out, const bool_report *report);
+/** Make sure that the report can be written, before the work begins. One rank calls, and bool_report_end in the end. Errors:
+ *  IO. */
+bool_exit bool_report_begin(bool_report *report, bool_failure *why);
+/** JSON for programs; the file appears when it is complete. The same rank calls. Errors: IO, INTERNAL. */
+bool_exit bool_report_write(bool_report *report, bool_failure *why);
+/** Leave nothing behind that is not complete. */
+void bool_report_end(bool_report *report);
+
+#endif

@@ -1,0 +1,284 @@
+/* operand -- a CGNS mesh, of which each rank has a part, or a closed surface, which rank 0 has; what their cells and faces
+ * have, taken over to the result. */
+#include "boolean.h"
+
+#include <fnmatch.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- surfaces ------------------------------------------------------------------------------------------------------ */
+
+static bool_exit from_surface(rsurf_status status, const rsurf_message *message, bool_failure *why)
+{
+  static const bool_exit code[] = {[RSURF_OK]       = BOOL_DONE,
+                                   [RSURF_USAGE]    = BOOL_USAGE,
+                                   [RSURF_IO]       = BOOL_IO,
+                                   [RSURF_GEOMETRY] = BOOL_GEOMETRY,
+                                   [RSURF_MEMORY]   = BOOL_INTERNAL};
+
+  return status == RSURF_OK ? BOOL_DONE : bool_fail(why, code[status], "%s", message->text);
+}
+
+/* Rank 0 alone. */
+static bool_exit read_surface(const char *path, double scale, bool_operand *o, bool_failure *why)
+{
+  rsurf_message message;
+
+  BOOL_TRY(from_surface(rsurf_read(path, scale, &o->surface, &message), &message, why));
+  return from_surface(rsurf_repair(&o->surface, path, &o->repairs, &message), &message, why);
+}
+
+/* Rank 0's list of texts to all. The caller's texts stay his. Collective. */
+static bool_exit share_names(MPI_Comm comm, int num, char *const *from, char ***out, bool_failure *why)
+{
+  int rank;
+
+  MPI_Comm_rank(comm, &rank);
+  *out = calloc((size_t)num + 1, sizeof **out);
+  BOOL_TRY(bool_agree(comm, *out ? BOOL_DONE : bool_no_memory(why), why));
+  for (int i = 0; i < num; i++) {
+    int length = rank == 0 ? (int)strlen(from[i]) : 0;
+
+    MPI_Bcast(&length, 1, MPI_INT, 0, comm);
+    (*out)[i] = calloc((size_t)length + 1, 1);
+    BOOL_TRY(bool_agree(comm, (*out)[i] ? BOOL_DONE : bool_no_memory(why), why));
+    if (rank == 0) memcpy((*out)[i], from[i], (size_t)length);
+    MPI_Bcast((*out)[i], length, MPI_CHAR, 0, comm);
+  }
+  return BOOL_DONE;
+}
+
+static bool_exit open_surface(MPI_Comm comm, const char *path, double scale, bool_operand *o, bool_failure *why)
+{
+  int64_t count[2] = {0, 0};
+  int     rank;
+
+  MPI_Comm_rank(comm, &rank);
+  o->is_surface = true;
+  BOOL_TRY(bool_agree(comm, rank == 0 ? read_surface(path, scale, o, why) : BOOL_DONE, why));
+  if (rank == 0) {
+    count[0] = o->surface.num_bodies;
+    count[1] = o->surface.num_groups;
+  }
+  MPI_Bcast(count, 2, MPI_INT64_T, 0, comm);
+  MPI_Bcast(&o->repairs, (int)sizeof o->repairs, MPI_BYTE, 0, comm);
+  o->num_cells      = count[0];
+  o->num_boundaries = (int)count[1];
+  o->mesh           = rsurf_mesh(&o->surface, path);
+  o->face_boundary  = o->surface.face_group;
+  BOOL_TRY(share_names(comm, o->num_boundaries, o->surface.group_name, &o->own_name, why));
+  o->boundary_name = (const char *const *)o->own_name;
+  return BOOL_DONE;
+}
+
+/* ---- meshes -------------------------------------------------------------------------------------------------------- */
+
+static bool_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, bool_operand *o, bool_failure *why)
+{
+  rcgns_options    how;
+  rcgns_choice     choice;
+  rcgns_boundaries boundaries;
+  rcgns_message    message;
+
+  rcgns_options_default(&how);
+  how.base = options->base[side];
+  if (side == 1) how.scale = options->scale;
+  BOOL_TRY(bool_from_cgns(rcgns_open(comm, o->path, &how, &o->file, &message), &message, why));
+  o->mesh      = *rcgns_mesh(o->file);
+  o->num_cells = rcgns_get_info(o->file)->num_cells;
+  BOOL_TRY(bool_from_cgns(rcgns_read_boundaries(o->file, &boundaries, &message), &message, why));
+  o->num_boundaries = boundaries.num;
+  o->boundary_name  = boundaries.name;
+  o->boundary_type  = boundaries.type;
+  o->face_boundary  = boundaries.face;
+  rcgns_choice_default(&choice);
+  choice.name     = options->solution;
+  choice.optional = 1;
+  return bool_from_cgns(rcgns_select_solution(o->file, &choice, &o->solution, &message), &message, why);
+}
+
+bool_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, bool_failure *why)
+{
+  *out = (bool_operand){.path = options->path[side]};
+  if (rsurf_is_path(out->path)) return open_surface(comm, out->path, side == 1 ? options->scale : 1.0, out, why);
+  return open_mesh(comm, options, side, out, why);
+}
+
+void bool_operand_close(bool_operand *operand)
+{
+  for (int i = 0; i < operand->num_boundaries && operand->own_name; i++) free(operand->own_name[i]);
+  free(operand->own_name);
+  rsurf_drop(&operand->surface);
+  rcgns_close(&operand->file);
+}
+
+/* ---- boundaries ---------------------------------------------------------------------------------------------------- */
+
+/* The number of a boundary in the list of the result, which grows by it if it is new. */
+static int32_t number_of(bool_content *c, const char *name, const char *type)
+{
+  int i = 0;
+
+  while (i < c->content.num_boundaries && (strcmp(c->boundary_name[i], name) || strcmp(c->boundary_type[i], type))) i++;
+  c->boundary_name[i] = name;
+  c->boundary_type[i] = type;
+  if (i == c->content.num_boundaries) c->content.num_boundaries++;
+  return i;
+}
+
+/* Boundary of the faces of the result that lie in faces of one operand; those that have one already keep it. Collective. */
+static bool_exit take_boundaries(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, int64_t num_faces,
+                                 bool_content *c, bool_failure *why)
+{
+  int32_t *mine     = malloc(((size_t)o->mesh.num_faces + 1) * sizeof *mine);
+  int32_t *taken    = malloc(((size_t)num_faces + 1) * sizeof *taken),
+          *number   = calloc((size_t)o->num_boundaries + 1, sizeof *number);
+  bool_exit    code = bool_agree(comm, mine && taken && number ? BOOL_DONE : bool_no_memory(why), why);
+  remap_status status;
+
+  for (int b = 0; code == BOOL_DONE && b < o->num_boundaries; b++)
+    number[b] = number_of(c, o->boundary_name[b], o->boundary_type ? o->boundary_type[b] : "UserDefined");
+  for (int64_t f = 0; code == BOOL_DONE && f < o->mesh.num_faces; f++)
+    mine[f] = o->face_boundary && o->face_boundary[f] >= 0 ? number[o->face_boundary[f]] : -1;
+  if (code == BOOL_DONE) {
+    status = remap_supermesh_face_values(ctx, (remap_side)side, mine, -1, taken);
+    if (status != REMAP_OK) code = bool_fail(why, BOOL_INTERNAL, "%s: %s", o->path, remap_status_text(status));
+  }
+  for (int64_t f = 0; code == BOOL_DONE && f < num_faces; f++)
+    if (c->face_boundary[f] < 0) c->face_boundary[f] = taken[f];
+  free(mine);
+  free(taken);
+  free(number);
+  return code;
+}
+
+/* ---- fields -------------------------------------------------------------------------------------------------------- */
+
+/* Does one of the comma separated names and globs name it? */
+static bool is_listed(const char *list, const char *name)
+{
+  char pattern[256];
+
+  if (!list) return true;
+  for (const char *from = list, *to; *from; from = *to ? to + 1 : to) {
+    const size_t n = strcspn(from, ",");
+
+    to = from + n;
+    if (n >= sizeof pattern) continue;
+    memcpy(pattern, from, n);
+    pattern[n] = '\0';
+    if (!strcmp(pattern, name) || fnmatch(pattern, name, 0) == 0) return true;
+  }
+  return false;
+}
+
+/* The field of that name that all zones of an operand have, -1: none. */
+static int64_t find_field(const bool_operand *o, const char *name)
+{
+  for (int64_t i = 0; i < o->solution.num_fields; i++)
+    if (o->solution.field[i].missing_in < 0 && !strcmp(o->solution.field[i].name, name)) return i;
+  return -1;
+}
+
+/* Names of the fields to take over: A's, then those that B alone has. The ancestors and volumes are the writer's own. */
+static int list_fields(const bool_options *options, const bool_operand operand[2], const char **name)
+{
+  int num = 0;
+
+  for (int side = 0; side < 2; side++)
+    for (int64_t i = 0; i < operand[side].solution.num_fields; i++) {
+      const rcgns_field *field = &operand[side].solution.field[i];
+
+      if (field->missing_in >= 0 || !is_listed(options->fields, field->name)) continue;
+      if (side == 1 && find_field(&operand[0], field->name) >= 0) continue;
+      if (!strcmp(field->name, "AncestorA") || !strcmp(field->name, "AncestorB") || !strcmp(field->name, "Volume")) continue;
+      name[num++] = field->name;
+    }
+  return num;
+}
+
+/* A field of one operand for the cells that lie in it; where only is set, for those alone that do not lie in A. Collective. */
+static bool_exit take_field(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, const char *name,
+                            const remap_supermesh_view *view, bool after_a, double *values, bool_failure *why)
+{
+  double       *in   = malloc(((size_t)o->mesh.num_cells + 1) * sizeof *in);
+  double       *out  = malloc(((size_t)view->num_cells + 1) * sizeof *out);
+  bool_exit     code = bool_agree(comm, in && out ? BOOL_DONE : bool_no_memory(why), why);
+  rcgns_message message;
+  remap_status  status;
+
+  if (code == BOOL_DONE) code = bool_from_cgns(rcgns_read_field(o->file, name, in, &message), &message, why);
+  if (code == BOOL_DONE) {
+    status = remap_supermesh_cell_values(ctx, (remap_side)side, in, NAN, out);
+    if (status != REMAP_OK) code = bool_fail(why, BOOL_INTERNAL, "%s: %s", o->path, remap_status_text(status));
+  }
+  for (int64_t c = 0; code == BOOL_DONE && c < view->num_cells; c++)
+    if (!after_a || view->cell_ancestor[0][c] < 0) values[c] = out[c];
+  free(in);
+  free(out);
+  return code;
+}
+
+static bool_exit take_fields(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                             const remap_supermesh_view *view, bool_content *c, bool_failure *why)
+{
+  const char **name = calloc((size_t)(operand[0].solution.num_fields + operand[1].solution.num_fields) + 1, sizeof *name);
+  int          num  = name ? list_fields(options, operand, name) : 0;
+  bool_exit    code;
+
+  c->field  = calloc((size_t)num + 1, sizeof *c->field);
+  c->values = malloc(((size_t)num * (size_t)view->num_cells + 1) * sizeof *c->values);
+  code      = bool_agree(comm, name && c->field && c->values ? BOOL_DONE : bool_no_memory(why), why);
+  if (code == BOOL_DONE && options->fields && !num)
+    code = bool_fail(why, BOOL_USAGE, "--fields: neither %s nor %s has a cell-centred field '%.200s' in all zones",
+                     options->path[0], options->path[1], options->fields);
+  for (int k = 0; k < num && code == BOOL_DONE; k++) {
+    double *values = c->values + (size_t)k * (size_t)view->num_cells;
+    bool    in_a   = false;
+
+    c->field[k] = (rslice_field){.name = name[k], .values = values};
+    for (int64_t i = 0; i < view->num_cells; i++) values[i] = NAN;
+    for (int side = 0; side < 2 && code == BOOL_DONE; side++) {
+      if (find_field(&operand[side], name[k]) < 0) continue;
+      code = take_field(comm, ctx, side, &operand[side], name[k], view, in_a, values, why);
+      in_a = true;
+    }
+  }
+  c->content.num_fields = num;
+  c->content.field      = c->field;
+  free(name);
+  return code;
+}
+
+/* ---- both ---------------------------------------------------------------------------------------------------------- */
+
+bool_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                            const remap_supermesh_view *view, bool_content *out, bool_failure *why)
+{
+  const size_t most = (size_t)(operand[0].num_boundaries + operand[1].num_boundaries) + 1;
+  bool_exit    code;
+
+  *out = (bool_content){.content       = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}},
+                        .boundary_name = calloc(most, sizeof *out->boundary_name),
+                        .boundary_type = calloc(most, sizeof *out->boundary_type),
+                        .face_boundary = malloc(((size_t)view->num_faces + 1) * sizeof *out->face_boundary)};
+  code = out->boundary_name && out->boundary_type && out->face_boundary ? BOOL_DONE : bool_no_memory(why);
+  BOOL_TRY(bool_agree(comm, code, why));
+  out->content.boundary_name = out->boundary_name;
+  out->content.boundary_type = out->boundary_type;
+  out->content.face_boundary = out->face_boundary;
+  for (int64_t f = 0; f < view->num_faces; f++) out->face_boundary[f] = -1;
+  for (int side = 0; side < 2; side++) BOOL_TRY(take_boundaries(comm, ctx, side, &operand[side], view->num_faces, out, why));
+  return take_fields(comm, options, ctx, operand, view, out, why);
+}
+
+void bool_content_drop(bool_content *content)
+{
+  free(content->field);
+  free(content->values);
+  free(content->boundary_name);
+  free(content->boundary_type);
+  free(content->face_boundary);
+  *content = (bool_content){.field = NULL};
+}

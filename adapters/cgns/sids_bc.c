@@ -1,0 +1,393 @@
+/* sids_bc -- boundary conditions: which faces of this rank's mesh are on which BC_t.
+ *
+ * The mesh keeps for each face without neighbour what a file calls it (rc_rim). Conditions of blocks are ranges of indices,
+ * known from the tree. Those of other zones are lists of element numbers or vertices, which all ranks read in the same blocks,
+ * and each looks up its own faces; where faces are elements of their own (TRI_3 and so on) their sections are read first, to
+ * learn their numbers. O(rim + boundary elements of the file) on every rank, with no list in memory. */
+#include "cgns_private.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BLOCK = 1 << 18 };
+
+/* One zone while its conditions are read. */
+typedef struct bc_zone {
+  rcgns_file    *file;
+  const rc_zone *zone;
+  rc_rim        *rim; /* those of the zone */
+  int64_t        num;
+  rc_map         by_nodes;  /* standard elements: nodes of a rim -> its place in rim_of */
+  rc_array       rim_of;    /* int64_t */
+  rc_map         by_number; /* element number -> place in rim_of_number */
+  rc_array       rim_of_number;
+  rc_map         node;  /* nodes of rims */
+  uint8_t       *named; /* [nodes of rims] the condition's list has it */
+} bc_zone;
+
+static void drop_zone(bc_zone *z)
+{
+  rc_map_drop(&z->by_nodes);
+  rc_map_drop(&z->by_number);
+  rc_map_drop(&z->node);
+  rc_drop(&z->rim_of);
+  rc_drop(&z->rim_of_number);
+  free(z->named);
+}
+
+/* The rim gets the boundary, unless it has one. */
+static void give(const bc_zone *z, int64_t rim, int32_t boundary)
+{
+  int32_t *has = &z->file->face_boundary[z->rim[rim].face];
+
+  if (*has < 0) *has = boundary;
+}
+
+/* Several rims may have one key: faces of flat cells. The map's index leads to the last, whose number is kept. */
+static bool add_key(rc_map *map, rc_array *rim_of, const int64_t *key, int64_t rim)
+{
+  const int64_t at = rc_map_add(map, key);
+
+  if (at < 0) return false;
+  if (at == rim_of->count) return rc_push(rim_of, rim);
+  ((int64_t *)rim_of->item)[at] = rim;
+  return true;
+}
+
+/* ---- what faces are called ------------------------------------------------------------------------------------------ */
+
+static bool is_poly(const rc_rim *rim) { return rim->key[1] < 0; }
+
+static bool index_rims(bc_zone *z)
+{
+  bool ok = true;
+
+  z->by_nodes.width  = 4;
+  z->by_number.width = z->node.width = 1;
+  for (int64_t i = 0; i < z->num && ok && !z->zone->is_structured; i++) {
+    const int64_t *key = z->rim[i].key;
+
+    if (is_poly(&z->rim[i])) {
+      ok = add_key(&z->by_number, &z->rim_of_number, key, i);
+      continue;
+    }
+    ok = add_key(&z->by_nodes, &z->rim_of, key, i);
+    for (int k = 0; k < 4 && key[k] >= 0 && ok; k++) ok = rc_map_add(&z->node, &key[k]) >= 0;
+  }
+  z->named = calloc((size_t)z->node.key.count + 1, 1);
+  return ok && z->named;
+}
+
+/* A surface element of n corners: is it a face of ours? */
+static bool number_face(bc_zone *z, const int64_t *corner, int n, int64_t number)
+{
+  int64_t key[4] = {-1, -1, -1, -1}, at;
+  int     num    = 0;
+
+  for (int i = 0; i < n; i++) {
+    const int64_t node = corner[i] - 1;
+    int           k    = 0;
+
+    while (k < num && key[k] != node) k++;
+    if (k < num) continue;
+    for (k = num++; k > 0 && key[k - 1] > node; k--) key[k] = key[k - 1];
+    key[k] = node;
+  }
+  at = rc_map_find(&z->by_nodes, key);
+  return at < 0 || add_key(&z->by_number, &z->rim_of_number, &number, ((const int64_t *)z->rim_of.item)[at]);
+}
+
+/* A section of surface elements of one type. Collective. */
+static rcgns_status number_fixed(bc_zone *z, int64_t node, int npe, int corners, rcgns_message *message)
+{
+  const rc_tree *tree   = &z->file->tree;
+  const int64_t  data   = rc_tree_find(tree, node, -1, NULL, "ElementConnectivity");
+  const int64_t  ranges = rc_tree_find(tree, node, -1, NULL, "ElementRange");
+  const int64_t *range  = ranges < 0 ? NULL : rc_small_ints(tree, rc_node_at(tree, ranges));
+  const int64_t  num    = data < 0 ? 0 : rc_count(rc_node_at(tree, data)) / npe;
+  int64_t       *block;
+  rcgns_status   status;
+
+  if (!range || num < 1 || rc_node_at(tree, data)->kind != 'I') return RCGNS_OK;
+  block  = rc_alloc((int64_t)BLOCK * npe, sizeof *block);
+  status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
+  for (int64_t lo = 0; lo < num && status == RCGNS_OK; lo += BLOCK) {
+    const int64_t hi = lo + BLOCK < num ? lo + BLOCK : num;
+    bool          ok = true;
+
+    status = rc_read_1d(z->file, RCGNS_OK, data, lo * npe, hi * npe, 'I', block, message);
+    for (int64_t i = lo; i < hi && status == RCGNS_OK && ok; i++)
+      ok = number_face(z, block + (i - lo) * npe, corners, range[0] + i);
+    if (status == RCGNS_OK) status = rc_agree(z->file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
+  }
+  free(block);
+  return status;
+}
+
+/* Surface elements among the rows of a MIXED section. Collective. */
+static rcgns_status number_mixed(bc_zone *z, const rc_section *s, rcgns_message *message)
+{
+  rc_array     offset = {.item = NULL}, data = {.item = NULL};
+  rcgns_status status = RCGNS_OK;
+
+  for (int64_t lo = 0; lo < s->num_rows && status == RCGNS_OK; lo += BLOCK) {
+    const int64_t hi = lo + BLOCK < s->num_rows ? lo + BLOCK : s->num_rows;
+    bool          ok = true;
+
+    status = rc_rows_read(z->file, z->zone, s, lo, hi, &offset, &data, message);
+    for (int64_t i = 0; i < hi - lo && status == RCGNS_OK && ok; i++) {
+      const int64_t *row     = (const int64_t *)data.item + ((const int64_t *)offset.item)[i];
+      const int      corners = rc_surface_corners(z->file->version, row[0]);
+
+      if (corners) ok = number_face(z, row + 1, corners, s->first + lo + i);
+    }
+    if (status == RCGNS_OK) status = rc_agree(z->file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
+  }
+  rc_drop(&offset);
+  rc_drop(&data);
+  return status;
+}
+
+/* Element numbers of the faces of standard elements. Collective. */
+static rcgns_status number_faces(bc_zone *z, rcgns_message *message)
+{
+  const rc_tree *tree = &z->file->tree;
+
+  for (int64_t at = -1; (at = rc_tree_find(tree, z->zone->node, at, "Elements_t", NULL)) >= 0;) {
+    const int64_t *type    = rc_small_ints(tree, rc_node_at(tree, at));
+    const int      corners = type ? rc_surface_corners(z->file->version, type[0]) : 0;
+    rc_shape       shape;
+
+    if (corners) RC_TRY(number_fixed(z, at, rc_element(z->file->version, type[0], &shape), corners, message));
+  }
+  for (int64_t i = 0; i < z->zone->num_sections; i++)
+    if (z->zone->section[i].layout == RC_MIXED) RC_TRY(number_mixed(z, &z->zone->section[i], message));
+  return RCGNS_OK;
+}
+
+/* ---- conditions ------------------------------------------------------------------------------------------------------ */
+
+/* Faces of a block in a range of indices {low i j k, high i j k} from 1, of vertices or of faces. */
+static void give_range(const bc_zone *z, const int64_t *range, bool of_vertices, int32_t boundary)
+{
+  for (int64_t i = 0; i < z->num; i++) {
+    const int64_t *key = z->rim[i].key, axis = key[0] / 2;
+    bool           in = true;
+
+    for (int d = 0; d < 3 && in; d++) {
+      const int64_t lo = range[d] < range[d + 3] ? range[d] : range[d + 3], hi = range[d] + range[d + 3] - lo,
+                    cell = key[1 + d] + 1;
+
+      in = d == axis ? lo == hi && lo == cell + key[0] % 2 : lo <= cell && cell + of_vertices <= hi;
+    }
+    if (in) give(z, i, boundary);
+  }
+}
+
+/* What a list or range names: the faces with these element numbers, or nodes. */
+static void give_numbers(bc_zone *z, const int64_t *number, int64_t n, bool of_vertices, int32_t boundary)
+{
+  for (int64_t i = 0; i < n; i++) {
+    const int64_t key = number[i] - of_vertices, at = rc_map_find(of_vertices ? &z->node : &z->by_number, &key);
+
+    if (at >= 0 && of_vertices) z->named[at] = 1;
+    if (at >= 0 && !of_vertices) give(z, ((const int64_t *)z->rim_of_number.item)[at], boundary);
+  }
+}
+
+/* Faces all of whose nodes were named; the names end. */
+static void give_named(bc_zone *z, int32_t boundary)
+{
+  for (int64_t i = 0; i < z->num; i++) {
+    const int64_t *key = z->rim[i].key;
+    bool           in  = !is_poly(&z->rim[i]);
+
+    for (int k = 0; k < 4 && key[k] >= 0 && in; k++) in = z->named[rc_map_find(&z->node, &key[k])];
+    if (in) give(z, i, boundary);
+  }
+  if (z->node.key.count) memset(z->named, 0, (size_t)z->node.key.count);
+}
+
+/* A list or range of numbers, in blocks. Collective. */
+static rcgns_status give_list(bc_zone *z, int64_t node, bool is_range, bool of_vertices, int32_t boundary,
+                              rcgns_message *message)
+{
+  const rc_node *n      = rc_node_at(&z->file->tree, node);
+  const rc_box   box    = rc_whole(n);
+  const int64_t *range  = is_range ? rc_small_ints(&z->file->tree, n) : NULL;
+  const int64_t  num    = range ? range[1] - range[0] + 1 : rc_count(n);
+  int64_t       *block  = rc_alloc(BLOCK, sizeof *block);
+  rcgns_status   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
+
+  for (int64_t lo = 0; lo < num && status == RCGNS_OK; lo += BLOCK) {
+    const int64_t hi = lo + BLOCK < num ? lo + BLOCK : num;
+
+    if (range)
+      for (int64_t i = lo; i < hi; i++) block[i - lo] = range[0] + i;
+    else
+      status = rc_read(z->file, RCGNS_OK, node, &box, lo, hi, 'I', block, message);
+    if (status == RCGNS_OK) give_numbers(z, block, hi - lo, of_vertices, boundary);
+  }
+  if (status == RCGNS_OK && of_vertices) give_named(z, boundary);
+  free(block);
+  return status;
+}
+
+/* ---- names ----------------------------------------------------------------------------------------------------------- */
+
+/* Is it a type that SIDS knows? */
+static bool is_known(const char *type)
+{
+  static const char *const known[] = {"BCAxisymmetricWedge",
+                                      "BCDegenerateLine",
+                                      "BCDegeneratePoint",
+                                      "BCDirichlet",
+                                      "BCExtrapolate",
+                                      "BCFarfield",
+                                      "BCGeneral",
+                                      "BCInflow",
+                                      "BCInflowSubsonic",
+                                      "BCInflowSupersonic",
+                                      "BCNeumann",
+                                      "BCOutflow",
+                                      "BCOutflowSubsonic",
+                                      "BCOutflowSupersonic",
+                                      "BCSymmetryPlane",
+                                      "BCSymmetryPolar",
+                                      "BCTunnelInflow",
+                                      "BCTunnelOutflow",
+                                      "BCWall",
+                                      "BCWallInviscid",
+                                      "BCWallViscous",
+                                      "BCWallViscousHeatFlux",
+                                      "BCWallViscousIsothermal"};
+
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    if (!strcmp(type, known[i])) return true;
+  return false;
+}
+
+/* The type of a condition; that of its family where it leaves it to it; UserDefined where nobody knows it. */
+static void type_of(const rc_tree *tree, const rc_zone *zone, int64_t bc, char out[RC_NAME])
+{
+  char    family[RC_NAME];
+  int64_t at;
+
+  rc_tree_string(tree, bc, out, RC_NAME);
+  if (!strcmp(out, "FamilySpecified")) {
+    rc_tree_string(tree, rc_tree_find(tree, bc, -1, "FamilyName_t", NULL), family, sizeof family);
+    at = rc_tree_find(tree, zone->base, -1, "Family_t", family);
+    at = at < 0 ? -1 : rc_tree_find(tree, at, -1, "FamilyBC_t", NULL);
+    if (at >= 0) rc_tree_string(tree, at, out, RC_NAME);
+  }
+  if (!is_known(out)) strcpy(out, "UserDefined");
+}
+
+/* The number of a boundary of that name and type, -1: no memory. */
+static int32_t boundary_of(rcgns_file *file, const char *name, const char *type)
+{
+  const char *const *names = file->boundary_name.item, *const *types = file->boundary_type.item;
+  const char        *keep[2];
+  int64_t            i = 0;
+
+  while (i < file->boundary_name.count && (strcmp(names[i], name) || strcmp(types[i], type))) i++;
+  if (i < file->boundary_name.count) return (int32_t)i;
+  keep[0] = rc_keep(file, "%s", name);
+  keep[1] = rc_keep(file, "%s", type);
+  if (!keep[0] || !keep[1] || !rc_reserve(&file->boundary_name, 1, sizeof *keep) ||
+      !rc_reserve(&file->boundary_type, 1, sizeof *keep))
+    return -1;
+  ((const char **)file->boundary_name.item)[file->boundary_name.count++] = keep[0];
+  ((const char **)file->boundary_type.item)[file->boundary_type.count++] = keep[1];
+  return (int32_t)i;
+}
+
+/* ---- the whole ------------------------------------------------------------------------------------------------------- */
+
+/* The node that says where a condition is; *is_elements: its numbers are element numbers whatever the location. */
+static int64_t place_of(const rc_tree *tree, int64_t bc, bool *is_range, bool *is_elements)
+{
+  static const char *const name[4] = {"PointRange", "PointList", "ElementRange", "ElementList"};
+
+  for (int i = 0; i < 4; i++) {
+    const int64_t at = rc_tree_find(tree, bc, -1, NULL, name[i]);
+
+    if (at < 0 || rc_node_at(tree, at)->kind != 'I') continue;
+    *is_range    = i % 2 == 0;
+    *is_elements = i >= 2;
+    if (!*is_range || rc_small_ints(tree, rc_node_at(tree, at))) return at;
+  }
+  return -1;
+}
+
+/* One condition of a zone. Collective. */
+static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
+{
+  const rc_tree *tree     = &z->file->tree;
+  bool           is_range = false, is_elements = false, of_vertices;
+  const int64_t  place = place_of(tree, bc, &is_range, &is_elements);
+  char           type[RC_NAME], location[RC_NAME], text[240];
+  int32_t        boundary;
+
+  type_of(tree, z->zone, bc, type);
+  rc_tree_string(tree, rc_tree_find(tree, bc, -1, "GridLocation_t", NULL), location, sizeof location);
+  of_vertices = !is_elements && (!*location || !strcmp(location, "Vertex"));
+  boundary    = boundary_of(z->file, rc_node_at(tree, bc)->name, type);
+  RC_TRY(rc_agree(z->file->comm, boundary < 0 ? rc_no_memory(message) : RCGNS_OK, message));
+  if (place >= 0 && z->zone->is_structured && is_range && rc_count(rc_node_at(tree, place)) == 6) {
+    give_range(z, rc_small_ints(tree, rc_node_at(tree, place)), of_vertices, boundary);
+    return RCGNS_OK;
+  }
+  if (place >= 0 && !z->zone->is_structured && !(of_vertices && z->zone->num_face_sections))
+    return give_list(z, place, is_range, of_vertices, boundary, message);
+  snprintf(text, sizeof text, "zone %.60s: boundary condition %s is left out: its place is given in a way that is not read",
+           z->zone->name, rc_node_at(tree, bc)->name);
+  return rc_note(z->file, message, text);
+}
+
+/* All conditions of a zone, whose rims are num at rim. Collective. */
+static rcgns_status read_zone(rcgns_file *file, const rc_zone *zone, rc_rim *rim, int64_t num, rcgns_message *message)
+{
+  bc_zone      z      = {.file = file, .zone = zone, .rim = rim, .num = num};
+  int64_t      list   = -1;
+  rcgns_status status = rc_agree(file->comm, index_rims(&z) ? RCGNS_OK : rc_no_memory(message), message);
+
+  if (rc_tree_find(&file->tree, zone->node, -1, "ZoneBC_t", NULL) >= 0 && status == RCGNS_OK && !zone->is_structured)
+    status = number_faces(&z, message);
+  while (status == RCGNS_OK && (list = rc_tree_find(&file->tree, zone->node, list, "ZoneBC_t", NULL)) >= 0)
+    for (int64_t bc = -1; status == RCGNS_OK && (bc = rc_tree_find(&file->tree, list, bc, "BC_t", NULL)) >= 0;)
+      status = read_bc(&z, bc, message);
+  drop_zone(&z);
+  return status;
+}
+
+rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgns_message *message)
+{
+  rc_rim       *rim    = file->build.rim.item;
+  const int64_t num    = file->build.rim.count;
+  rcgns_status  status = RCGNS_OK;
+
+  message->text[0] = 0;
+  if (!file->face_boundary) {
+    file->face_boundary = rc_alloc(file->mesh.num_faces, sizeof *file->face_boundary);
+    status              = rc_agree(file->comm, file->face_boundary ? RCGNS_OK : rc_no_memory(message), message);
+    for (int64_t f = 0; f < file->mesh.num_faces && status == RCGNS_OK; f++) file->face_boundary[f] = -1;
+    for (int64_t z = 0, at = 0; z < file->num_zones && status == RCGNS_OK; z++) {
+      const int64_t first = at;
+
+      while (at < num && rim[at].zone == file->zone[z].node) at++;
+      status = read_zone(file, &file->zone[z], rim + first, at - first, message);
+    }
+  }
+  if (status != RCGNS_OK) {
+    free(file->face_boundary);
+    file->face_boundary = NULL;
+    return status;
+  }
+  *out = (rcgns_boundaries){.num  = (int)file->boundary_name.count,
+                            .name = file->boundary_name.item,
+                            .type = file->boundary_type.item,
+                            .face = file->face_boundary};
+  return RCGNS_OK;
+}
