@@ -78,6 +78,9 @@ remap_status rm_grow(void *data, int64_t *capacity, int64_t need, size_t size);
 int64_t rm_add_sat(int64_t a, int64_t b);
 int64_t rm_mul_sat(int64_t a, int64_t b);
 
+/* The greater of two numbers, neither of them NaN: for loops in which the call of fmax would count. */
+static inline double rm_max(double a, double b) { return a > b ? a : b; }
+
 /* ---- sorting --------------------------------------------------------------------------------------------------- */
 
 /* A 64-bit key and what it belongs to. */

@@ -15,7 +15,7 @@
 
 /* ---- what rounding decides ----------------------------------------------------------------------------------------------- */
 
-static double largest_extent(const double box[6]) { return fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])); }
+static double largest_extent(const double box[6]) { return rm_max(box[3] - box[0], rm_max(box[4] - box[1], box[5] - box[2])); }
 
 /* Extent of what the pair's points are computed from: edges and faces of i, of j. */
 static double operand_extent(const work *w, rm_lid i, const slot *s)
@@ -169,7 +169,7 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
   for (int d = 0; d < 3; d++) {
     a[d] -= g->first[d];
     b[d] -= g->first[d];
-    g->reach = fmax(g->reach, fmax(fabs(a[d]), fabs(b[d])));
+    g->reach = rm_max(g->reach, rm_max(fabs(a[d]), fabs(b[d])));
   }
   g->area +=
       sign * (n[0] * (a[1] * b[2] - a[2] * b[1]) + n[1] * (a[2] * b[0] - a[0] * b[2]) + n[2] * (a[0] * b[1] - a[1] * b[0]));

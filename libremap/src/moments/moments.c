@@ -29,7 +29,7 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
   s->target        = j;
   s->first_polygon = NO_POLYGONS;
   s->last_polygon  = -1;
-  s->is_local      = MUCH_SMALLER * fmax(b[3] - b[0], fmax(b[4] - b[1], b[5] - b[2])) < w->extent;
+  s->is_local      = MUCH_SMALLER * rm_max(b[3] - b[0], rm_max(b[4] - b[1], b[5] - b[2])) < w->extent;
   s->reach         = s->is_local ? 0 : w->extent;
   memcpy(s->o, w->centre, sizeof s->o);
   for (int c = 0; c < 3 && s->is_local; c++) {
@@ -310,7 +310,7 @@ INLINE void all_sides(work *w, rm_lid i, sink *add_side)
   const rm_trimesh *m1 = w->o->mesh[0];
   const double     *box = m1->cell_box[i];
 
-  w->extent = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
+  w->extent = rm_max(box[3] - box[0], rm_max(box[4] - box[1], box[5] - box[2]));
   for (int c = 0; c < 3; c++) w->centre[c] = box[c] + 0.5 * (box[c + 3] - box[c]);
   for (rm_lid a = m1->cell_triangle_offset[i]; a < m1->cell_triangle_offset[i + 1]; a++) {
     const plane  pt = plane_of(w, 0, m1->cell_triangle[a] / 2);

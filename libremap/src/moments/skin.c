@@ -161,7 +161,7 @@ static remap_status need_tree(work *w, int mesh)
       const double x = m->vertex[m->triangle[t][0]][c], y = m->vertex[m->triangle[t][1]][c],
                    z = m->vertex[m->triangle[t][2]][c];
       box[t][c]      = fmin(x, fmin(y, z));
-      box[t][c + 3]  = fmax(x, fmax(y, z));
+      box[t][c + 3]  = rm_max(x, rm_max(y, z));
     }
   w->triangle_box[mesh] = box;
   return rm_boxtree_build(w->scratch, m->num_triangles, (const double(*)[6])box, &w->tree[mesh]);
@@ -183,7 +183,7 @@ static void find_coplanar(search *s)
   for (int h = 0; h < 3; h++)
     for (int c = 0; c < 3; c++) {
       box[c]     = fmin(box[c], m->vertex[m->triangle[s->t][h]][c]);
-      box[c + 3] = fmax(box[c + 3], m->vertex[m->triangle[s->t][h]][c]);
+      box[c + 3] = rm_max(box[c + 3], m->vertex[m->triangle[s->t][h]][c]);
     }
   rm_boxtree_query(w->tree[other], (const double(*)[6])w->triangle_box[other], box, look_at, s);
 }

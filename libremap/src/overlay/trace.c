@@ -23,7 +23,7 @@ typedef struct hit {
 
 enum {
   MAX_LOCAL = 256,
-  CLEARANCE = 3 /* lengths of an edge around it that are to be free of skin */
+  CLEARANCE = 2 /* lengths of an edge around it that are to be free of skin */
 };
 
 /* Error of an edge's side against a line in the sheared frame, by the square of the reach of its coordinates. With u = 2^-53:
@@ -107,7 +107,7 @@ static bool surely_misses(const tracer *t, rm_lid b)
     const double  dx = q[i] - t->p0[i], dy = q[j] - t->p0[j], dz = q[k] - t->p0[k];
     x[h]  = dx - t->shear[0] * dz;
     y[h]  = dy - t->shear[1] * dz;
-    reach = fmax(reach, fmax(fabs(dx), fmax(fabs(dy), fabs(dz))));
+    reach = rm_max(reach, rm_max(fabs(dx), rm_max(fabs(dy), fabs(dz))));
   }
   const double bound = LINE_NOISE * reach * reach;
   for (int h = 0; h < 3; h++) {
@@ -312,21 +312,37 @@ static inline void sides(const view *w, const uint8_t v[3], double d[3])
   for (int h = 0; h < 3; h++) d[h] = w->x[v[h]] * w->y[v[(h + 1) % 3]] - w->x[v[(h + 1) % 3]] * w->y[v[h]];
 }
 
+/* crosses, where sign[h] holds those sides that are certain, else 0. The third side runs against its edge. */
+static __attribute__((noinline)) int crosses_closely(const tracer *t, rm_lid b, const int sign[3])
+{
+  const rm_lid *e = t->other->triangle_edge[b];
+  int           all = sign[0] ? sign[0] : sign[1] ? sign[1] : sign[2];
+
+  for (int h = 0; h < 3; h++) {
+    if (sign[h]) continue;
+    const int s = h == 2 ? -edge_side(t, e[h]) : edge_side(t, e[h]);
+    if (!s || (all && s != all)) return 0;
+    all = s;
+  }
+  return all;
+}
+
 /* Sign with which the line crosses triangle b, whose vertices are v in the view. Exact. */
 static inline int crosses(const tracer *t, const view *w, const uint8_t v[3], rm_lid b)
 {
   const double bound = LINE_NOISE * w->reach * w->reach;
   double       d[3];
-  int          along = 0, against = 0;
+  int          sign[3], along = 0, against = 0;
 
   sides(w, v, d);
   for (int h = 0; h < 3; h++) {
     along += d[h] > bound;
     against += d[h] < -bound;
+    sign[h] = t->turn * ((d[h] > bound) - (d[h] < -bound));
   }
   if (along && against) return 0;
-  if (along == 3 || against == 3) return along ? t->turn : -t->turn;
-  return line_crosses(t, b);
+  if (along == 3 || against == 3) return sign[0];
+  return crosses_closely(t, b, sign);
 }
 
 /* The edge ends before it meets triangle next, which its line crosses. Exact. */

@@ -477,8 +477,8 @@ static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
   const rm_lid  first = m->cell_vertex_offset[c], last = m->cell_vertex_offset[c + 1];
 
   for (int k = 0; k < 3; k++) {
-    reach = fmax(reach, fmax(fabs(a[k + 3] - b[k]), fabs(a[k] - b[k])));
-    reach = fmax(reach, fmax(fabs(m->vertex[m->triangle[skin][1]][k] - b[k]), fabs(m->vertex[m->triangle[skin][2]][k] - b[k])));
+    reach = rm_max(reach, rm_max(fabs(a[k + 3] - b[k]), fabs(a[k] - b[k])));
+    reach = rm_max(reach, rm_max(fabs(m->vertex[m->triangle[skin][1]][k] - b[k]), fabs(m->vertex[m->triangle[skin][2]][k] - b[k])));
   }
   const double noise = 0x1p-46 * reach * reach * reach;
   for (rm_lid k = first; k < last; k++) {

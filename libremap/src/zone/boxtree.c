@@ -262,7 +262,7 @@ int rm_boxtree_query_segment(const rm_boxtree *tree, const double (*item_box)[6]
     s.box[d + 3] = p[d] < q[d] ? q[d] : p[d];
     s.half[d]    = 0.5 * (s.box[d + 3] - s.box[d]);
     s.middle[d]  = s.box[d] + s.half[d];
-    s.slack      = fmax(s.slack, fmax(s.half[d], 4 * fmax(fabs(p[d]), fabs(q[d]))));
+    s.slack      = rm_max(s.slack, rm_max(s.half[d], 4 * rm_max(fabs(p[d]), fabs(q[d]))));
     if (p[d] > q[d]) s.half[d] = -s.half[d];
   }
   s.slack *= 0x1p-48; /* coordinates of magnitude c make t and e err by a few ulps of c */
