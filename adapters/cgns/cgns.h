@@ -207,6 +207,16 @@ rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values
  *  Errors: USAGE (a zone has no such CellCenter array of its size), IO (it cannot be read), MEMORY. */
 rcgns_status rcgns_read_cells(rcgns_file *file, const char *name, double *values, rcgns_message *message);
 
+/** An ideal gas, p = (gamma - 1) rho e = rho R T. */
+typedef struct rcgns_gas {
+  double gamma;        /**< ratio of specific heats, above 1; 0: not told, or not the same in all zones */
+  double gas_constant; /**< R, above 0, in the file's units; 0: likewise */
+} rcgns_gas;
+
+/** The gas of GasModel_t (SpecificHeatRatio, IdealGasConstant) in FlowEquationSet_t, else of ReferenceState_t, of the zones or
+ *  their bases; specific heats do as well. Models without a constant ratio count as not told. Not collective. */
+void rcgns_get_gas(const rcgns_file *file, rcgns_gas *out);
+
 /** Refuse an output path that cannot be right: one of the files that `file` was read from, something that is not a regular
  *  file, or a place that cannot be written. Nothing is changed. Collective. Errors: USAGE, IO. */
 rcgns_status rcgns_check_output(const rcgns_file *file, const char *path, rcgns_message *message);

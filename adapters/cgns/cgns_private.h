@@ -11,6 +11,7 @@
  *   sids_dual.c  the cells about its vertices instead
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
  *   sids_bc.c      BC_t: which faces are on which boundary
+ *   sids_gas.c     FlowEquationSet_t and ReferenceState_t: the gas
  *   sids_fields.c  FlowSolution_t: choice, names, values
  *   sids_write.c   the plan of an output file, rcgns_write
  *   sids_create.c  plans from nothing, rcgns_create

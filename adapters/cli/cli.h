@@ -2,6 +2,7 @@
  *
  *   main.c      the job: open, read, build, transfer, verify, write, report
  *   fields.c    which fields take part, and their values
+ *   system.c    which fields move together, and how vectors turn
  *   masks.c     which cells give and which want values
  *   coverage.c  how much of the cells is covered
  *   check.c     --check

@@ -132,10 +132,10 @@ static void describe_field(cli_job *j, const rcgns_field *field, remap_nature na
   const remap_limiter limiter = j->options.transfer.limiter;
 
   j->field[k] = (remap_field_desc){.name = field->name, .nature = nature, .has_old = has_old_value(j, field->name)};
-  j->row[k]   = (cli_field_row){.name = field->name, .nature = nature, .limiter = slopes ? limiter : REMAP_LIMITER_NONE};
+  j->row[k]   = (cli_field_row){
+        .name = field->name, .nature = nature, .limiter = slopes ? limiter : REMAP_LIMITER_NONE, .is_told = is_given};
   if (!field->nature_known && !field->is_integer && !is_given)
     cli_note(j, "field %s: its name is not known, it is averaged over volume: say what it is by --nature", field->name);
-  if (nature == REMAP_MASS_SPECIFIC) cli_note(j, "field %s: a quantity per mass, it is averaged over volume", field->name);
 }
 
 /* Choose the fields and make room for their values. */
@@ -147,7 +147,7 @@ static cli_exit select_fields(cli_job *j, cli_failure *why)
   remap_nature         *nature = calloc(most + 1, sizeof *nature);
   cli_exit              mine;
 
-  j->field = calloc(most + 1, sizeof *j->field);
+  j->field = calloc(most + 2, sizeof *j->field); /* and a hidden one */
   j->row   = calloc(most + 1, sizeof *j->row);
   mine     = cli_agree(j, wanted && given && nature && j->field && j->row ? CLI_DONE : cli_no_memory(why), why);
   if (mine == CLI_DONE) mine = find_natures(j, nature, given, why);
@@ -181,10 +181,10 @@ static cli_exit make_room(cli_job *j, cli_failure *why)
   const int64_t num_in = rcgns_mesh(j->file[REMAP_SOURCE])->num_cells, num_out = rcgns_mesh(j->file[REMAP_TARGET])->num_cells;
   double       *at;
 
-  j->values = calloc((size_t)j->num_fields * (size_t)(num_in + num_out) + 1, sizeof *j->values);
+  j->values = calloc((size_t)(j->num_fields + j->num_hidden) * (size_t)(num_in + num_out) + 1, sizeof *j->values);
   CLI_TRY(cli_agree(j, j->values ? CLI_DONE : cli_no_memory(why), why));
   at = j->values;
-  for (int k = 0; k < j->num_fields; k++, at += num_in + num_out) {
+  for (int k = 0; k < j->num_fields + j->num_hidden; k++, at += num_in + num_out) {
     j->field[k].in  = at;
     j->field[k].out = at + num_in;
   }
@@ -201,15 +201,34 @@ static cli_exit read_field(cli_job *j, remap_side side, const char *name, double
   cli_exit          mine = CLI_DONE;
 
   CLI_TRY(cli_from_cgns(rcgns_read_field(j->file[side], name, values, &message), &message, why));
-  while (cell < mesh->num_cells && isfinite(values[cell])) cell++;
+  while (cell < mesh->num_cells && (isfinite(values[cell]) || j->options.allow_nan)) cell++;
   if (cell < mesh->num_cells) {
     const rcgns_zone_info *zone = cli_zone_of(info, mesh->cell_global[cell]);
 
     mine = cli_fail(why, CLI_IO, "%s: zone %s: cell %lld (counted from 1): %s is not a finite number: %s", info->path,
                     zone->name, (long long)(mesh->cell_global[cell] - zone->first_cell + 1), name,
-                    side == REMAP_SOURCE ? "leave the field out by --fields" : "write elsewhere by --output-solution");
+                    side == REMAP_SOURCE ? "leave the field out by --fields, or give --allow-nan"
+                                         : "write elsewhere by --output-solution");
   }
   return cli_agree(j, mine, why);
+}
+
+/* The values of the hidden density. */
+static cli_exit fill_hidden(cli_job *j, cli_failure *why)
+{
+  const int64_t  num[2] = {rcgns_mesh(j->file[REMAP_SOURCE])->num_cells, rcgns_mesh(j->file[REMAP_TARGET])->num_cells};
+  const double **value  = malloc(((size_t)j->num_fields + 1) * sizeof *value);
+  cli_exit       mine   = cli_agree(j, value ? CLI_DONE : cli_no_memory(why), why);
+
+  for (int side = 0; side < 2 && mine == CLI_DONE; side++) {
+    const remap_field_desc *hidden = &j->field[j->num_fields];
+
+    for (int k = 0; k < j->num_fields; k++) value[k] = side == REMAP_SOURCE ? j->field[k].in : j->field[k].out;
+    if (side == REMAP_SOURCE || hidden->has_old)
+      cli_hidden_density(j, value, num[side], side == REMAP_SOURCE ? (double *)hidden->in : hidden->out);
+  }
+  free(value);
+  return mine;
 }
 
 cli_exit cli_fields_read(cli_job *j, cli_failure *why)
@@ -218,6 +237,7 @@ cli_exit cli_fields_read(cli_job *j, cli_failure *why)
   CLI_TRY(select_solutions(j, why));
   CLI_TRY(select_fields(j, why));
   CLI_TRY(check_coverage_name(j, why));
+  cli_systems_find(j);
   CLI_TRY(make_room(j, why));
   for (int k = 0; k < j->num_fields; k++) {
     remap_field_desc *field = &j->field[k];
@@ -225,5 +245,5 @@ cli_exit cli_fields_read(cli_job *j, cli_failure *why)
     CLI_TRY(read_field(j, REMAP_SOURCE, field->name, (double *)field->in, why));
     if (field->has_old) CLI_TRY(read_field(j, REMAP_TARGET, field->name, field->out, why));
   }
-  return CLI_DONE;
+  return j->num_hidden ? fill_hidden(j, why) : CLI_DONE;
 }

@@ -47,6 +47,8 @@ cli_exit cli_from_remap(const cli_job *j, remap_status status, cli_failure *why)
     default: break;
   }
   if (!*text) text = remap_status_text(status);
+  if (strstr(text, "is not above 0"))
+    return cli_fail(why, code, "%s: repair it, or let nothing move with it by --nature Density=volume-mean", text);
   if (status == REMAP_COVERAGE)
     return cli_fail(why, code, "%s: allow it by --on-uncovered, --on-partial or --min-coverage", text);
   if (strstr(text, path[REMAP_SOURCE]) || strstr(text, path[REMAP_TARGET])) return cli_fail(why, code, "%s", text);

@@ -19,18 +19,21 @@ typedef struct cli_job {
   MPI_Comm       comm;
   int            rank;
   cli_options    options;
-  double         begin;    /**< MPI_Wtime */
-  cli_progress  *progress; /**< NULL but on a rank that speaks */
+  double         begin;           /**< MPI_Wtime */
+  double         transform[3][4]; /**< of SOURCE */
+  double         rotation[3][3];  /**< in it, if transfer.rotation is set */
+  cli_progress  *progress;        /**< NULL but on a rank that speaks */
   rcgns_file    *file[2];
   rcgns_solution solution[2];
   remap_context *ctx;
 
   double           *fraction[2]; /**< [remap_side][cells of this rank] of their volume that is covered: psi and phi */
   int               num_fields;
-  remap_field_desc *field;   /**< [num_fields] names, natures and where the values are */
-  cli_field_row    *row;     /**< [num_fields] the same fields in the report */
-  double           *values;  /**< behind every in and out of field */
-  uint8_t          *mask[2]; /**< [remap_side][cells of this rank] SOURCE: which give, TARGET: which want; NULL: all */
+  int               num_hidden; /**< further fields, 0 or 1, that take part and are not written */
+  remap_field_desc *field;      /**< [num_fields + num_hidden] names, natures, roles and where the values are */
+  cli_field_row    *row;        /**< [num_fields] the same fields in the report */
+  double           *values;     /**< behind every in and out of field */
+  uint8_t          *mask[2];    /**< [remap_side][cells of this rank] SOURCE: which give, TARGET: which want; NULL: all */
 
   int             num_notes;
   char          **note;        /**< [num_notes] remarks for the report */
@@ -60,6 +63,13 @@ cli_exit cli_fields_read(cli_job *j, cli_failure *why);
 
 /** Is a field of that name the mask of one side? Not collective. */
 bool cli_is_mask(const cli_options *options, const char *field);
+
+/** Find out which fields of the job move in a system, by which gas model, and which are vectors that turn with SOURCE: sets
+ *  members of field, row and options.transfer, and may add a hidden density. Not collective; alike on all ranks. */
+void cli_systems_find(cli_job *j);
+
+/** The hidden density from the values, [num_fields][num_cells], of the other fields. Not collective. */
+void cli_hidden_density(const cli_job *j, const double *const *value, int64_t num_cells, double *density);
 
 /** Read the masks that were asked for: fills mask and the report's words about them. Collective. Errors: USAGE (no such field,
  *  no known codes, no cell takes part), IO, INTERNAL. */

@@ -82,6 +82,7 @@ static cli_exit open_file(cli_job *j, remap_side side, cli_failure *why)
       CLI_TRY(cli_agree(j, mine, why));
       MPI_Bcast(how.transform, 12, MPI_DOUBLE, 0, j->comm);
     }
+    memcpy(j->transform, how.transform, sizeof j->transform);
   }
   CLI_TRY(cli_from_cgns(rcgns_open(j->comm, options->path[side], &how, &j->file[side], &message), &message, why));
   j->report.info[side] = rcgns_get_info(j->file[side]);
@@ -148,7 +149,8 @@ static cli_exit build(cli_job *j, cli_failure *why)
 
   cli_progress_set(j->progress, "overlay", -1);
   remap_options_default(&options);
-  options.faces                 = j->options.faces;
+  options.faces = j->options.faces;
+  for (int k = 0; k < j->num_fields; k++) options.systems |= j->field[k].system;
   options.max_order             = j->options.check && j->options.transfer.order < 2 ? 2 : j->options.transfer.order;
   options.zone_overlap_is_error = !j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET]; /* which tell zones apart */
   options.log                   = j->options.verbose && !j->options.quiet ? print_log : NULL;
@@ -167,13 +169,15 @@ static cli_exit build(cli_job *j, cli_failure *why)
 
 static cli_exit transfer(cli_job *j, cli_failure *why)
 {
+  remap_transfer     *how   = &j->options.transfer;
   const double        begin = MPI_Wtime();
-  remap_field_report *what  = calloc((size_t)j->num_fields, sizeof *what);
+  remap_field_report *what  = calloc((size_t)j->num_fields + 1, sizeof *what);
   cli_exit            mine  = cli_agree(j, what ? CLI_DONE : cli_no_memory(why), why);
 
   cli_progress_set(j->progress, "transfer", -1);
+  how->allow_nan = j->options.allow_nan;
   if (mine == CLI_DONE)
-    mine = cli_from_remap(j, remap_field(j->ctx, REMAP_FORWARD, &j->options.transfer, j->num_fields, j->field, what), why);
+    mine = cli_from_remap(j, remap_field(j->ctx, REMAP_FORWARD, how, j->num_fields + j->num_hidden, j->field, what), why);
   for (int k = 0; mine == CLI_DONE && k < j->num_fields; k++) j->row[k].what = what[k];
   if (mine == CLI_DONE) cli_masks_fill(j);
   free(what);
@@ -204,7 +208,7 @@ static cli_exit verify(const cli_job *j, cli_failure *why)
   for (int k = 0; k < j->num_fields; k++) {
     const double error = j->row[k].what.conservation_error;
 
-    if (error <= CLI_MAX_CONSERVATION) continue;
+    if (error <= CLI_MAX_CONSERVATION || (j->options.allow_nan && isnan(error))) continue;
     return cli_fail(why, CLI_VERIFY,
                     "%s: field %s is conserved only within %.1e, the bar is %.0e: nothing is written; see whether a mesh folds",
                     j->options.path[REMAP_SOURCE], j->row[k].name, error, CLI_MAX_CONSERVATION);

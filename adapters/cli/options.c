@@ -29,6 +29,9 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
   X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                      \
   X(NATURE, 0, "nature", "NAME=NATURE,...", OTHER,                                                                            \
     "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")   \
+  X(GAMMA, 0, "gamma", "RATIO", OTHER,                                                                                        \
+    "ratio of specific heats, to carry pressure as energy; default what\nFlowEquationSet or ReferenceState of SOURCE says")   \
+  X(ALLOW_NAN, 0, "allow-nan", NULL, AT(allow_nan), "let values that are no numbers pass: they spoil the cells they reach")   \
   X(ORDER, 0, "order", "1|2|3", OTHER, "accuracy of the transfer; default 2")                                                 \
   X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", OTHER,                                                           \
     "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                             \
@@ -56,6 +59,8 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
   X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                           \
   X(SCALE, 0, "scale", "FACTOR", OTHER, "multiply SOURCE's coordinates first")                                                \
   X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")       \
+  X(KEEP_VECTORS, 0, "keep-vectors", NULL, AT(keep_vectors),                                                                  \
+    "do not turn velocities and other vectors when that is a rotation")                                                       \
   X(CHECK, 0, "check", NULL, AT(check), "transfer known fields and say how well: PASS or FAIL; no OUTPUT")                    \
   X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                  \
   X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                         \
@@ -254,6 +259,10 @@ static cli_exit parse_value(const option_row *row, const char *argument, cli_opt
     case KEY_SCALE:
       if (!number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
         return cli_fail(why, CLI_USAGE, "--scale: '%.200s' is no factor: give a positive number", argument);
+      break;
+    case KEY_GAMMA:
+      if (!number(argument, &out->gamma) || !(out->gamma > 1) || isinf(out->gamma))
+        return cli_fail(why, CLI_USAGE, "--gamma: '%.200s' is no ratio of specific heats: give a number above 1", argument);
       break;
     case KEY_MIN_COVERAGE:
       if (!number(argument, &out->min_coverage) || !(out->min_coverage >= 0 && out->min_coverage <= 1))

@@ -28,6 +28,9 @@ typedef struct cli_options {
   bool           check;           /**< try the two meshes, write nothing */
   bool           coverage;        /**< write phi into OUTPUT */
   int64_t        step;            /**< 1 ..; -1 the last; 0 not given */
+  double         gamma;           /**< 0: not given */
+  bool           keep_vectors;    /**< vectors do not turn with SOURCE */
+  bool           allow_nan;
   double         scale;
   double         min_coverage; /**< of a target cell, 0 .. 1; default 0 */
   rcgns_location location;     /**< of the fields of both files */

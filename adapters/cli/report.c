@@ -65,6 +65,13 @@ void cli_report_overlap(FILE *out, const cli_report *report)
   fflush(out);
 }
 
+static const char *weight_word(const cli_field_row *row)
+{
+  static const char *const word[] = {[CLI_BY_VOLUME] = "volume", [CLI_BY_MASS] = "mass", [CLI_BY_GAS] = "gas model"};
+
+  return row->nature == REMAP_FLAG ? "none" : word[row->weight];
+}
+
 /* A cell that is not wholly covered, for people. */
 static void print_bare(FILE *out, const rcgns_info *info, const char *how, const remap_partial_cell *bare)
 {
@@ -105,15 +112,15 @@ void cli_report_fields(FILE *out, const cli_report *report)
 
   for (int i = 0; i < report->num_fields; i++)
     if ((int)strlen(report->field[i].name) > width) width = (int)strlen(report->field[i].name);
-  fprintf(out, "\n%-*s %-13s %20s %20s %8s  %s\n", width, "field", "nature", "source integral", "target integral", "error",
-          "range of source, of target");
+  fprintf(out, "\n%-*s %-13s %-9s %20s %20s %8s  %s\n", width, "field", "nature", "weight", "source integral",
+          "target integral", "error", "range of source, of target");
   for (int i = 0; i < report->num_fields; i++) {
     const cli_field_row      *row  = &report->field[i];
     const remap_field_report *what = &row->what;
 
-    fprintf(out, "%-*s %-13s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name,
-            cli_nature_word(row->nature), what->source_integral, what->target_integral, what->conservation_error,
-            what->source_min, what->source_max, what->target_min, what->target_max);
+    fprintf(out, "%-*s %-13s %-9s %20.12g %20.12g %8.1e  %.5g .. %.5g, %.5g .. %.5g\n", width, row->name,
+            cli_nature_word(row->nature), weight_word(row), what->source_integral, what->target_integral,
+            what->conservation_error, what->source_min, what->source_max, what->target_min, what->target_max);
   }
   fflush(out);
 }
@@ -244,14 +251,20 @@ static json_t *cover_json(const cli_report *report, remap_side side)
 static json_t *field_json(const cli_field_row *row)
 {
   const remap_field_report *what = &row->what;
+  const json_int_t count[]       = {what->limited_cells,    what->order_reduced_cells, what->scaled_cells,  what->blended_cells,
+                                    what->normalised_cells, what->kept_cells,          what->nearest_cells, what->filled_cells};
+  static const char *const counted[] = {"limited_cells",    "order_reduced_cells", "scaled_cells",  "blended_cells",
+                                        "normalised_cells", "kept_cells",          "nearest_cells", "filled_cells"};
+  json_t                  *field;
 
-  return json_pack("{s:o, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:I, s:I}", "name", words(row->name), "nature",
-                   cli_nature_word(row->nature), "order", what->order, "limiter", cli_limiter_word(row->limiter),
-                   "source_integral", real(what->source_integral), "target_integral", real(what->target_integral),
-                   "conservation_error", real(what->conservation_error), "source_min", real(what->source_min), "source_max",
-                   real(what->source_max), "target_min", real(what->target_min), "target_max", real(what->target_max),
-                   "limited_cells", (json_int_t)what->limited_cells, "order_reduced_cells",
-                   (json_int_t)what->order_reduced_cells);
+  field = json_pack("{s:o, s:s, s:s, s:i, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "name", words(row->name), "nature",
+                    cli_nature_word(row->nature), "weight", weight_word(row), "order", what->order, "limiter",
+                    cli_limiter_word(row->limiter), "source_integral", real(what->source_integral), "target_integral",
+                    real(what->target_integral), "conservation_error", real(what->conservation_error), "source_min",
+                    real(what->source_min), "source_max", real(what->source_max), "target_min", real(what->target_min),
+                    "target_max", real(what->target_max));
+  for (size_t i = 0; i < sizeof count / sizeof *count; i++) json_object_set_new(field, counted[i], json_integer(count[i]));
+  return field;
 }
 
 static json_t *check_json(const cli_report *report)

@@ -28,10 +28,19 @@ typedef struct cli_check_row {
 /** Is the figure good enough? A NaN is not. Not collective. */
 bool cli_check_passes(const cli_check_row *row);
 
+/** What a field is weighted with. */
+typedef enum cli_weight {
+  CLI_BY_VOLUME = 0,
+  CLI_BY_MASS   = 1, /**< it moves in a system with Density */
+  CLI_BY_GAS    = 2  /**< likewise, as the energy that the gas model makes of it */
+} cli_weight;
+
 /** One transferred field. */
 typedef struct cli_field_row {
   const char        *name;
   remap_nature       nature;
+  bool               is_told; /**< by --nature */
+  cli_weight         weight;
   remap_limiter      limiter; /**< in effect */
   remap_field_report what;
 } cli_field_row;

@@ -22,11 +22,15 @@ typedef struct recipe {
   double      second_zone; /* not 0: a second zone, from there on */
   bool        is_ngon;     /* NGON_n and NFACE_n, one cell */
   bool        is_surface;  /* quadrilaterals only */
+  int         gas;         /* not 0: velocities, pressure, temperature, mass fractions and a gas model: see gas_bits */
   bool        masks;       /* a node Masks: Iblank, ChimeraCellType and others; Density is absurd in their holes */
   bool        hole_column; /* the holes are the first cells along x of the second zone instead */
   bool        bow_tie;     /* one cell that is turned inside out over half of its width: its volume nearly cancels */
   bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices;
 } recipe;
+
+/* What a file with a gas holds; velocity, pressure and temperature are uniform unless Density is left out. */
+enum gas_bits { GAS = 1, GAS_RATIO = 2, GAS_CONSTANT = 4, GAS_DENSITY = 8, GAS_VACUUM = 16, GAS_LONE = 32 };
 
 static const recipe recipes[] = {
     {.name = "good", .n = 4, .high = 1, .fields = 1},
@@ -48,6 +52,12 @@ static const recipe recipes[] = {
     {.name = "at_vertices", .n = 2, .high = 1, .fields = 1, .at_vertices = true},
     {.name = "vertex_old", .n = 3, .low = .5, .high = 1.5, .fields = 7, .at_vertices = true},
     {.name = "zones_overlap", .n = 2, .high = 1, .second_zone = .25},
+    {.name = "gas", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY | GAS_RATIO | GAS_CONSTANT},
+    {.name = "gas_untold", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY},
+    {.name = "gas_without_density", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_RATIO},
+    {.name = "gas_by_state", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_RATIO | GAS_CONSTANT},
+    {.name = "gas_vacuum", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY | GAS_RATIO | GAS_VACUUM},
+    {.name = "gas_lone", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY | GAS_LONE},
     {.name = "masked", .n = 4, .high = 1, .fields = 1, .masks = true},
     {.name = "overset", .n = 2, .high = 1, .fields = 1, .masks = true, .second_zone = .5, .hole_column = true},
     {.name = "wide", .n = 4, .low = -1, .high = 2, .fields = 1},
@@ -192,6 +202,49 @@ static void add_solution(double zone, const recipe *r, bool is_second, const cha
   add_1d(solution, "cellN", "DataArray_t", "I4", count, flag);
 }
 
+/* A flow with velocity (1, 2, 3) and pressure 1, temperature 1 / density; the components in an order of their own. */
+static void add_gas(double zone, const recipe *r)
+{
+  static const struct {
+    const char *name;
+    int         needs;
+    double      value; /* 0: density; < 0: not uniform */
+  } field[]             = {{"VelocityZ", GAS, 3},      {"Density", GAS_DENSITY, 0}, {"VelocityX", GAS, 1},
+                           {"VelocityY", GAS, 2},      {"Pressure", GAS, 1},        {"Temperature", GAS, -1},
+                           {"MassFractionA", GAS, -2}, {"MassFractionB", GAS, -3},  {"Tracer", GAS_LONE, 5}};
+  const double solution = add(zone, "FlowSolution", "FlowSolution_t", "MT", 0, NULL, NULL);
+  const int    n        = r->n * r->n * r->n;
+  double       x[MAX_CELLS];
+
+  add_text(solution, "GridLocation", "GridLocation_t", "CellCenter");
+  for (size_t f = 0; f < sizeof field / sizeof *field; f++) {
+    if (!(r->gas & field[f].needs) || ((r->gas & GAS_LONE) && field[f].value == 2)) continue;
+    for (int c = 0; c < n; c++) {
+      const double density = 1 + .9 * sin(5 * c), fraction = .5 + .5 * sin(7 * c);
+
+      x[c] = field[f].value > 0     ? field[f].value
+             : field[f].value == 0  ? density
+             : field[f].value == -1 ? 1 / density
+                                    : fraction;
+      if (field[f].value == -3) x[c] = 1 - fraction;
+      if (field[f].value == 0 && (r->gas & GAS_VACUUM) && c == 4) x[c] = 0;
+    }
+    add_1d(solution, field[f].name, "DataArray_t", "R8", n, x);
+  }
+}
+
+static void add_gas_model(double base, const recipe *r)
+{
+  const double set   = add(base, "FlowEquationSet", "FlowEquationSet_t", "MT", 0, NULL, NULL);
+  const double model = add_text(set, "GasModel", "GasModel_t", "CaloricallyPerfect");
+  const double ratio = 1.5, constant = 2;
+
+  if (r->gas & GAS_RATIO) add_1d(model, "SpecificHeatRatio", "DataArray_t", "R8", 1, &ratio);
+  if (r->gas & GAS_CONSTANT)
+    add_1d(add(base, "ReferenceState", "ReferenceState_t", "MT", 0, NULL, NULL), "IdealGasConstant", "DataArray_t", "R8", 1,
+           &constant);
+}
+
 /* Masks by several conventions, some with real values, one that names no cell and one that is broken. */
 static void add_masks(double zone, const recipe *r, bool is_second)
 {
@@ -235,7 +288,10 @@ static void add_zone(double base, const recipe *r, bool is_second)
     add_polyhedron(zone, r);
   else
     add_hexahedra(zone, r);
-  if (r->fields != 0) add_solution(zone, r, is_second, "FlowSolution", r->fields);
+  if (r->gas)
+    add_gas(zone, r);
+  else if (r->fields != 0)
+    add_solution(zone, r, is_second, "FlowSolution", r->fields);
   if (r->second != 0) add_solution(zone, r, is_second, "Other", r->second);
   if (r->masks) add_masks(zone, r, is_second);
 }
@@ -254,6 +310,7 @@ static void write_file(const char *folder, const recipe *r)
   base = add_1d(root, "Base", "CGNSBase_t", "I4", 2, dimension);
   add_zone(base, r, false);
   if (r->second_zone != 0) add_zone(base, r, true);
+  if (r->gas) add_gas_model(base, r);
   must(cgio_close_file(file), path);
 }
 

@@ -33,6 +33,7 @@ quick "an empty argument is refused" "solution" good.cgns mesh.cgns -o out/resul
 quick "a flag takes no argument" "quiet" good.cgns mesh.cgns -o out/result.cgns --quiet=1
 quick "a scale of 0 is refused" "--scale" good.cgns mesh.cgns -o out/result.cgns --scale 0
 quick "a scale is a number" "--scale" good.cgns mesh.cgns -o out/result.cgns --scale 2x
+quick "a ratio of specific heats is above 1" "--gamma: '1'" good.cgns mesh.cgns -o out/result.cgns --gamma 1
 quick "a step is a number or last" "--step" good.cgns mesh.cgns -o out/result.cgns --step first
 quick "a step counts from 1" "--step" good.cgns mesh.cgns -o out/result.cgns --step 0
 quick "a nature is one of four" "'Density=heavy'" good.cgns mesh.cgns -o out/result.cgns --nature Density=heavy
@@ -43,16 +44,16 @@ quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out
 for option in location=face order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
-for option in priority supermesh gamma cgns-version; do
+for option in priority supermesh cgns-version; do
   quick "--$option is not offered" "'--$option'" good.cgns mesh.cgns -o out/result.cgns "--$option" x
 done
 
 works 1 --help
 for option in fields nature order limiter faces on-uncovered on-partial location solution step output-solution source-base \
-  target-base scale transform check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
+  target-base scale transform gamma allow-nan keep-vectors check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
-if grep -E 'priority|supermesh|gamma' stdout; then complain "--help offers too much"; fi
+if grep -E 'priority|supermesh' stdout; then complain "--help offers too much"; fi
 [ "$(awk 'length > 128' stdout)" = "" ] || complain "--help is wide"
 hold "$wrong" "--help says every option, and no other"
 works 2 --version
