@@ -4,6 +4,7 @@
  *   fields.c    which fields take part, and their values
  *   system.c    which fields move together, and how vectors turn
  *   masks.c     which cells give and which want values
+ *   volumes.c   cell volumes of the solvers
  *   coverage.c  how much of the cells is covered
  *   check.c     --check
  *   job.c       what these share

@@ -35,6 +35,8 @@ typedef struct cli_job {
   double           *values;     /**< behind every in and out of field */
   uint8_t          *mask[2];    /**< [remap_side][cells of this rank] SOURCE: which give, TARGET: which want; NULL: all */
 
+  double *volume[2]; /**< [remap_side][cells of this rank] the solver's own, NULL: none */
+
   int             num_notes;
   char          **note;        /**< [num_notes] remarks for the report */
   cli_report_file report_file; /**< on rank 0 */
@@ -74,6 +76,10 @@ void cli_hidden_density(const cli_job *j, const double *const *value, int64_t nu
 /** Read the masks that were asked for: fills mask and the report's words about them. Collective. Errors: USAGE (no such field,
  *  no known codes, no cell takes part), IO, INTERNAL. */
 cli_exit cli_masks_read(cli_job *j, cli_failure *why);
+
+/** Read the solvers' cell volumes that were asked for: fills volume. Collective. Errors: USAGE (no such field), IO (not above
+ *  0), INTERNAL. */
+cli_exit cli_volumes_read(cli_job *j, cli_failure *why);
 
 /** Give the library the masks, after remap_build. Collective. Errors: INTERNAL. */
 cli_exit cli_masks_apply(cli_job *j, cli_failure *why);

@@ -159,7 +159,12 @@ static cli_exit build(cli_job *j, cli_failure *why)
   status                        = remap_create(j->comm, &options, &j->ctx);
   if (status != REMAP_OK)
     return cli_fail(why, CLI_INTERNAL, "%s: %s", j->options.path[REMAP_SOURCE], remap_status_text(status));
-  for (int side = 0; side < 2; side++) remap_set_mesh(j->ctx, (remap_side)side, rcgns_mesh(j->file[side]));
+  for (int side = 0; side < 2; side++) {
+    remap_mesh mesh = *rcgns_mesh(j->file[side]);
+
+    mesh.cell_volume = j->volume[side];
+    remap_set_mesh(j->ctx, (remap_side)side, &mesh);
+  }
   CLI_TRY(cli_from_remap(j, remap_build(j->ctx), why));
   CLI_TRY(cli_from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why));
   CLI_TRY(cli_masks_apply(j, why));
@@ -301,6 +306,7 @@ static cli_exit run(cli_job *j, cli_failure *why)
   CLI_TRY(open_files(j, why));
   if (!j->options.check) CLI_TRY(cli_fields_read(j, why));
   CLI_TRY(cli_masks_read(j, why));
+  CLI_TRY(cli_volumes_read(j, why));
   j->report.seconds_read = slowest(j, j->begin);
   MPI_Comm_size(j->comm, &j->report.stats.ranks);
   if (speaks) cli_report_meshes(stdout, &j->report, j->options.verbose);
@@ -326,7 +332,7 @@ static void end(cli_job *j)
   for (int side = 0; side < 2; side++) rcgns_close(&j->file[side]);
   for (int i = 0; i < j->num_notes; i++) free(j->note[i]);
   free(j->note);
-  for (int side = 0; side < 2; side++) free(j->mask[side]), free(j->fraction[side]);
+  for (int side = 0; side < 2; side++) free(j->mask[side]), free(j->fraction[side]), free(j->volume[side]);
   free(j->values);
   free(j->row);
   free(j->field);

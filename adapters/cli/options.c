@@ -49,6 +49,9 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
     "1+2")                                                                                                                    \
   X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                   \
     "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                          \
+  X(SOURCE_VOLUME, 0, "source-volume", "FIELD", AT(volume[REMAP_SOURCE]),                                                     \
+    "conserve what SOURCE's solver integrates, with its own cell volumes")                                                    \
+  X(TARGET_VOLUME, 0, "target-volume", "FIELD", AT(volume[REMAP_TARGET]), "likewise what TARGET's solver integrates")         \
   X(LOCATION, 0, "location", "cell|vertex", OTHER,                                                                            \
     "where fields are, in both files; default cell; vertex takes the\ncells of the median-dual mesh about the vertices")      \
   X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")     \

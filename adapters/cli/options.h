@@ -21,6 +21,7 @@ typedef struct cli_options {
   int            num_natures;
   const char    *nature[CLI_MAX_NATURES]; /**< [num_natures] lists of NAME=NATURE, comma separated */
   const char    *mask[2];                 /**< [remap_side] FIELD or FIELD=CODES */
+  const char    *volume[2];               /**< [remap_side] FIELD that holds the solver's cell volumes */
   const char    *base[2];                 /**< [remap_side] */
   const char    *solution, *output_solution;
   const char    *transform;       /**< path of a 3x4 matrix */

@@ -82,8 +82,23 @@ static void print_bare(FILE *out, const rcgns_info *info, const char *how, const
           bare->centroid[0], bare->centroid[1], bare->centroid[2]);
 }
 
+/* How the solver's volumes differ from those of the mesh. */
+static void print_volumes(FILE *out, const cli_report *report, remap_side side)
+{
+  const remap_stats *stats = &report->stats;
+  char               cell[256];
+
+  if (!report->volume[side]) return;
+  fprintf(out, "%s: volume by %s %.12g", side_word[side], report->volume[side], stats->solver_volume[side]);
+  if (stats->worst_volume_cell[side] >= 0)
+    fprintf(out, ", differs by %.1e at most, at %s", stats->max_volume_difference[side],
+            cell_words(report->info[side], stats->worst_volume_cell[side], cell, sizeof cell));
+  fputc('\n', out);
+}
+
 void cli_report_cover(FILE *out, const cli_report *report)
 {
+  for (int side = 0; side < 2; side++) print_volumes(out, report, (remap_side)side);
   for (int side = 0; side < 2; side++) {
     const cli_cover_row *cover = &report->cover[side];
 
@@ -190,11 +205,13 @@ static json_t *side_json(const cli_report *report, remap_side side)
   const int64_t     worst = report->stats.worst_inverted_cell[side];
   char              cell[256];
 
-  return json_pack("{s:o, s:I, s:I, s:o, s:I, s:o, s:o}", "file", words(info->path), "zones", (json_int_t)info->num_zones,
-                   "cells", (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "inverted_cells",
-                   (json_int_t)report->stats.inverted_cells[side], "worst_inverted_cell",
-                   words(worst < 0 ? NULL : cell_words(info, worst, cell, sizeof cell)), "solution",
-                   words(report->solution[side]));
+  return json_pack(
+      "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:o, s:o}", "file", words(info->path), "zones", (json_int_t)info->num_zones,
+      "cells", (json_int_t)info->num_cells, "volume", real(report->stats.volume[side]), "volume_field",
+      words(report->volume[side]), "solver_volume", real(report->stats.solver_volume[side]), "max_volume_difference",
+      real(report->stats.max_volume_difference[side]), "inverted_cells", (json_int_t)report->stats.inverted_cells[side],
+      "worst_inverted_cell", words(worst < 0 ? NULL : cell_words(info, worst, cell, sizeof cell)), "solution",
+      words(report->solution[side]));
 }
 
 static json_t *overlap_json(const remap_stats *stats)

@@ -63,6 +63,7 @@ typedef struct cli_report {
   remap_stats          stats;
   const char          *solution[2];              /**< [remap_side] names of the FlowSolution_t read and written */
   const char          *output, *source_coverage; /**< files that were written, NULL if not */
+  const char          *volume[2];                /**< [remap_side] field of the solver's volumes, NULL: none */
   const char          *mask[2];                  /**< [remap_side] as asked for, NULL: none */
   cli_cover_row        cover[2];                 /**< [remap_side] */
   int                  num_checks;

@@ -251,7 +251,7 @@ static void add_masks(double zone, const recipe *r, bool is_second)
   const double node = add(zone, "Masks", "DiscreteData_t", "MT", 0, NULL, NULL);
   const int    n    = r->n * r->n * r->n;
   float        iblank[MAX_CELLS], broken[MAX_CELLS];
-  double       cell_n[MAX_CELLS];
+  double       cell_n[MAX_CELLS], volume[MAX_CELLS];
   int          chimera[MAX_CELLS], none[MAX_CELLS];
 
   for (int c = 0; c < n; c++) {
@@ -261,12 +261,14 @@ static void add_masks(double zone, const recipe *r, bool is_second)
     cell_n[c]  = kind < 0 ? 2 : kind;
     chimera[c] = kind;
     none[c]    = 0;
+    volume[c]  = (c == 3 ? 1.25 : 1) / (r->n * r->n * r->n); /* of the unit cube, but for one */
     broken[c]  = c == n - 1 ? NAN : 1;
   }
   add_text(node, "GridLocation", "GridLocation_t", "CellCenter");
   add_1d(node, "Iblank", "DataArray_t", "R4", n, iblank);
   add_1d(node, "cellN", "DataArray_t", "R8", n, cell_n);
   add_1d(node, "ChimeraCellType", "DataArray_t", "I4", n, chimera);
+  add_1d(node, "Volume", "DataArray_t", "R8", n, volume);
   add_1d(node, "Nowhere", "DataArray_t", "I4", n, none);
   add_1d(node, "Broken", "DataArray_t", "R4", n, broken);
 }

@@ -71,6 +71,19 @@ works 1 masked.cgns mesh.cgns -o out.cgns --source-mask cellN --report report.js
 within 1 1 fields 0 target_min
 hold "$wrong" "unless they are named"
 
+# The solver's volumes: 1/64 each but for cell 4, which is a quarter larger; Density there is a hole's.
+works 2 wide.cgns masked.cgns -o out.cgns --report report.json --target-volume Volume --output-solution New
+near "$(value target solver_volume)" 1.00390625 1e-14
+near "$(value target max_volume_difference)" 0.25 1e-13
+within 0 1e-14 fields 0 conservation_error
+grep -q "differs by 2.5e-01 at most, at Base/Zone: cell 4" stdout || complain "people are not told"
+works 1 out.cgns mesh.cgns -o again.cgns --report report.json --solution New --source-volume Volume $density
+near "$(value fields 0 source_integral)" "$(value fields 0 target_integral)" 1e-14
+hold "$wrong" "--target-volume and --source-volume: what solvers integrate is conserved"
+works 1 masked.cgns mesh.cgns -o out.cgns --report report.json $density --source-mask Iblank --source-volume Volume --scale .5
+near "$(value source solver_volume)" 0.12548828125 1e-14
+hold "$wrong" "they are scaled with SOURCE"
+
 # Zones that overlap by half, the doubled cells of the second one being holes.
 works 2 overset.cgns wide.cgns -o out.cgns --report report.json $density --source-mask Iblank --on-uncovered fill=1 \
   --on-partial normalise
@@ -101,5 +114,7 @@ quick 2 "masked.cgns.*Nowhere" "a mask that leaves nothing is refused" --source-
 quick 2 "ChimeraCellType=1" "codes that nobody agrees on have to be given" --source-mask ChimeraCellType
 quick 2 "source-mask: '1+x'" "codes are whole numbers" --source-mask Iblank=1+x
 quick 2 "source-mask: '=1'" "a mask has a name" --source-mask =1
+quick 5 "masked.cgns.*Zone.*cell 1 .*Nowhere.*source-volume" "a volume of 0 is named" --source-volume Nowhere
+quick 2 "masked.cgns.*Zone.*no_such" "so is a volume that is not there" --source-volume no_such
 quick 5 "masked.cgns.*Zone.*cell 64.*Broken" "a code that is NaN is named" --source-mask Broken
 finish

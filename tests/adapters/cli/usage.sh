@@ -50,7 +50,7 @@ done
 
 works 1 --help
 for option in fields nature order limiter faces on-uncovered on-partial location solution step output-solution source-base \
-  target-base scale transform gamma allow-nan keep-vectors check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
+  target-base scale transform source-volume target-volume gamma allow-nan keep-vectors check min-coverage coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
 if grep -E 'priority|supermesh' stdout; then complain "--help offers too much"; fi
