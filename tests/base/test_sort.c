@@ -36,6 +36,27 @@ static void keys_are_sorted_and_equal_keys_keep_their_order(void)
   free(scratch);
 }
 
+static void words_are_sorted(void)
+{
+  uint64_t *data = malloc(MOST * sizeof *data), state = 2;
+
+  for (int s = 0; s < 4; s++)
+    for (int l = 0; l < NUM_LENGTHS; l++) {
+      int64_t  wrong = 0;
+      uint64_t sum = 0;
+
+      for (int64_t i = 0; i < lengths[l]; i++) sum += data[i] = shape[s](next(&state));
+      rm_sort_words(data, lengths[l]);
+      for (int64_t i = 0; i < lengths[l]; i++) {
+        sum -= data[i];
+        if (i) wrong += data[i] < data[i - 1];
+      }
+      RT_EQ(wrong, 0);
+      RT_EQ(sum, 0);
+    }
+  free(data);
+}
+
 enum { RANDOM, ASCENDING, DESCENDING, CONSTANT, TWO_VALUES, ORGAN_PIPE, NUM_PATTERNS };
 
 static double pattern(int which, int64_t i, int64_t n, uint64_t *state)
@@ -197,7 +218,7 @@ static void points_of_a_grid_do_not_collide(void)
   free(hash);
 }
 
-RT_MAIN(RT_CASE(keys_are_sorted_and_equal_keys_keep_their_order), RT_CASE(doubles_are_sorted),
+RT_MAIN(RT_CASE(keys_are_sorted_and_equal_keys_keep_their_order), RT_CASE(words_are_sorted), RT_CASE(doubles_are_sorted),
         RT_CASE(minus_zero_comes_before_plus_zero), RT_CASE(quicksort_killer_is_sorted_in_time),
         RT_CASE(sum_of_a_list_does_not_depend_on_its_order), RT_CASE(sum_of_a_list_is_compensated),
         RT_CASE(counts_become_offsets), RT_CASE(zeros_of_both_signs_hash_alike),

@@ -9,6 +9,8 @@
  *   dual         duals of such tetrahedra                    pancakes   as general, all 10^4 times thinner in z, rotated
  *   graded       as general, edges growing 1000 times along x, y and z
  *   layer        as general over a wavy wall, cells growing 10^4 times away from it
+ *   surface      a ball of 8 N^2 triangles as one cell on 16^3 warped hexahedra    itself   that ball on itself
+ *   cones        two cones of N^2 triangles each as one cell, on the same grid     wedges   N^2 wedges round one edge, likewise
  */
 #ifndef BENCH_H
 #define BENCH_H
@@ -17,8 +19,9 @@
 #include <sys/resource.h>
 #include <time.h>
 #include "meshes.h"
+#include "surfaces.h"
 
-#define BENCH_CASES "warped|general|finer|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer"
+#define BENCH_CASES "warped|general|finer|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer|surface|itself|cones|wedges"
 
 /* ---- clocks ------------------------------------------------------------------------------------------------------ */
 
@@ -149,6 +152,19 @@ static inline void bench_general_(int n, int m, tm_map map, tm_mesh *mesh[2])
   }
 }
 
+/* Those of a cell of many triangles, or of many cells round an edge. */
+static inline bool bench_surfaces_(const char *name, int n, tm_mesh *mesh[2])
+{
+  static const double middle[3] = {.1, .2, .3};
+
+  if (!strcmp(name, "surface") || !strcmp(name, "itself")) mesh[0] = surfaces_ball(n, 1, middle);
+  else if (!strcmp(name, "cones")) mesh[0] = surfaces_double_cone((int64_t)n * n);
+  else if (!strcmp(name, "wedges")) mesh[0] = surfaces_wedges((int64_t)n * n);
+  else return false;
+  mesh[1] = name[0] == 'i' ? surfaces_ball(n, 1, middle) : tm_benchmark(16, .7, .3, 3);
+  return true;
+}
+
 /* The meshes of a case; false if there is none of that name. The caller owns them: tm_free. */
 static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
 {
@@ -178,7 +194,7 @@ static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
   } else if (!strcmp(name, "graded") || !strcmp(name, "layer")) {
     bench_general_(n, n + 1, name[0] == 'g' ? bench_grade_ : bench_layer_, mesh);
   } else {
-    return false;
+    return bench_surfaces_(name, n, mesh);
   }
   return true;
 }

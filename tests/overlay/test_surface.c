@@ -1,49 +1,12 @@
 /* A closed surface of very many triangles as a mesh of one cell, against grids that it passes through. */
 #include "laid.h"
 #include "rt.h"
-
-/* An octahedron whose faces are divided into n^2 triangles, blown up to a ball of the given radius about a centre: 8 n^2. */
-static tm_mesh *ball(int n, double radius, const double centre[3])
-{
-  const int64_t side = 2 * n + 1;
-  tm_builder_   b    = {.num_cells = 1};
-  int64_t      *id;
-  tm_mesh      *mesh;
-
-  for (int octant = 0; octant < 8; octant++) {
-    const int sx = octant & 1 ? -1 : 1, sy = octant & 2 ? -1 : 1, sz = octant & 4 ? -1 : 1;
-
-    for (int i = 0; i < n; i++)
-      for (int j = 0; i + j < n; j++)
-        for (int up = 0; up < 2 && i + j + up < n; up++) { /* corners (i, j, n - i - j) on the octahedron, in units of 1 / n */
-          const int p[3][2] = {{i + up, j + up}, {i + 1, j}, {i, j + 1}};
-          int64_t   v[3];
-
-          for (int h = 0; h < 3; h++)
-            v[h] = ((int64_t)(n + sz * (n - p[h][0] - p[h][1])) * side + (n + sy * p[h][1])) * side + (n + sx * p[h][0]);
-          if ((sx * sy * sz < 0) != (up == 1)) {
-            const int64_t x = v[1];
-            v[1]            = v[2];
-            v[2]            = x;
-          }
-          tm_face_(&b, 0, 3, v);
-        }
-  }
-  mesh = tm_finish_(&b, side * side * side, &id);
-  for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
-    double       p[3]   = {(double)(id[v] % side - n), (double)(id[v] / side % side - n), (double)(id[v] / side / side - n)};
-    const double length = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-
-    for (int c = 0; c < 3; c++) mesh->xyz[3 * v + c] = centre[c] + radius * p[c] / length;
-  }
-  free(id);
-  return mesh;
-}
+#include "surfaces.h"
 
 /* The ball is covered by the grid, the grid's cells by the ball as their corners tell: a ball is convex. */
 static void check(int n, double radius, const double centre[3], tm_mesh *grid, remap_faces faces)
 {
-  tm_mesh *whole = ball(n, radius, centre);
+  tm_mesh *whole = surfaces_ball(n, radius, centre);
 
   for (int side = 0; side < 2; side++) { /* of the ball */
     laid *l = laid_over(side ? grid : whole, side ? whole : grid, faces, NULL);
@@ -113,7 +76,7 @@ static void cells_lie_in_a_ball(void) { check(40, 1, middle, grid_about(20, .2),
 static void two_balls_share_a_lens(void)
 {
   const int    n = 48;
-  tm_mesh     *a = ball(n, 1, (double[]){0, 0, 0}), *b = ball(n, 1, (double[]){.7, .5, .3});
+  tm_mesh     *a = surfaces_ball(n, 1, (double[]){0, 0, 0}), *b = surfaces_ball(n, 1, (double[]){.7, .5, .3});
   const double d = sqrt(.49 + .25 + .09), lens = M_PI * (4 + d) * (2 - d) * (2 - d) / 12;
   laid        *l = laid_over(a, b, REMAP_FACES_CENTRE, NULL), *back = laid_over(b, a, REMAP_FACES_CENTRE, NULL);
 
@@ -130,7 +93,7 @@ static void two_balls_share_a_lens(void)
 }
 static void a_ball_covers_itself(void)
 {
-  tm_mesh *a = ball(40, 1, middle), *inner = ball(30, .5, middle);
+  tm_mesh *a = surfaces_ball(40, 1, middle), *inner = surfaces_ball(30, .5, middle);
   laid    *l = laid_over(a, a, REMAP_FACES_CENTRE, NULL);
 
   if (RT_EQ(l->status, REMAP_OK)) {

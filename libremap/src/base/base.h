@@ -92,6 +92,9 @@ typedef struct rm_keyed {
 void rm_sort_keyed(rm_keyed *data, rm_keyed *scratch, int64_t n);
 /* Sort doubles ascending (-0 before +0); in place, no allocation, O(n log n), quick for short lists. No NaN. */
 void rm_sort_doubles(double *data, int64_t n);
+/* Sort words ascending; in place, no allocation, O(n log n), by insertion up to RM_FEW_WORDS of them. */
+enum { RM_FEW_WORDS = 24 };
+void rm_sort_words(uint64_t *data, int64_t n);
 /* Sum of a list that does not depend on its order: sorts data by value, then adds with compensation. */
 double rm_sum_sorted(double *data, int64_t n);
 /* In place exclusive prefix sum over count[0..n]: count[0..n-1] hold counts, afterwards offsets, count[n] the total. */

@@ -148,6 +148,43 @@ void rm_sort_doubles(double *data, int64_t n)
   quick_doubles(data, n, depth);
 }
 
+static void insert_words(uint64_t *data, int64_t n)
+{
+  for (int64_t i = 1; i < n; i++) {
+    const uint64_t x = data[i];
+    int64_t        k = i;
+
+    for (; k > 0 && data[k - 1] > x; k--) data[k] = data[k - 1];
+    data[k] = x;
+  }
+}
+
+/* Put x into the heap of n words whose root is free. */
+static void sift_word(uint64_t *data, int64_t at, int64_t n, uint64_t x)
+{
+  for (int64_t child; (child = 2 * at + 1) < n; at = child) {
+    if (child + 1 < n && data[child] < data[child + 1]) child++;
+    if (data[child] <= x) break;
+    data[at] = data[child];
+  }
+  data[at] = x;
+}
+
+void rm_sort_words(uint64_t *data, int64_t n)
+{
+  if (n <= RM_FEW_WORDS) {
+    insert_words(data, n);
+    return;
+  }
+  for (int64_t i = n / 2; i-- > 0;) sift_word(data, i, n, data[i]);
+  for (int64_t i = n; i-- > 1;) {
+    const uint64_t x = data[i];
+
+    data[i] = data[0];
+    sift_word(data, 0, i, x);
+  }
+}
+
 double rm_sum_sorted(double *data, int64_t n)
 {
   double sum = 0, lost = 0; /* lost: what rounding took from sum (Neumaier) */

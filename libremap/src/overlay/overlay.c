@@ -5,6 +5,7 @@
  * bytes each, for the ends of one triangle are few. */
 #include "overlay/overlay.h"
 
+#include <string.h>
 #include "overlay/trace.h"
 
 enum { MAX_CROSSINGS = 1 << 30 };
@@ -12,12 +13,20 @@ enum { MAX_CROSSINGS = 1 << 30 };
 /* +1 if triangle boundary h of a star entry runs along the edge. */
 static inline int along(rm_lid star) { return (star & 3) == 2 ? -1 : 1; }
 
-static remap_status file_ends(rm_arena *arena, rm_overlay *o)
+/* An end as a word: words ascend as ends are to stand. */
+#define LAST (UINT64_C(1) << 31)
+static inline uint64_t end_word(rm_lid other, int64_t crossing, int side, bool is_last)
+{
+  return (uint64_t)(uint32_t)other << 32 | (is_last ? LAST : 0) | (uint64_t)(2 * crossing + side);
+}
+
+/* Of all segments in a triangle of mesh 1, the ends as words. */
+static remap_status file_ends(rm_arena *arena, rm_overlay *o, uint64_t **out)
 {
   const rm_trimesh *m1 = o->mesh[0], *m2 = o->mesh[1];
   const rm_trace   *t1 = &o->trace[0], *t2 = &o->trace[1];
   int64_t          *offset;
-  rm_end           *end;
+  uint64_t         *end;
 
   RM_NEW0(offset, arena, (int64_t)m1->num_triangles + 2);
   for (rm_lid e = 0; e < m1->num_edges; e++)
@@ -33,39 +42,37 @@ static remap_status file_ends(rm_arena *arena, rm_overlay *o)
       const rm_lid b = t1->crossing[x].triangle / 2;
       const int    s = t1->crossing[x].triangle & 1 ? -1 : 1;
       for (rm_lid k = m1->star_offset[e]; k < m1->star_offset[e + 1]; k++)
-        end[offset[m1->star[k] / 4 + 1]++] = (rm_end){b, 4 * (uint32_t)x + (along(m1->star[k]) * s < 0)};
+        end[offset[m1->star[k] / 4 + 1]++] = end_word(b, x, 0, along(m1->star[k]) * s < 0);
     }
   for (rm_lid f = 0; f < m2->num_edges; f++)
     for (int64_t x = t2->first[f]; x < t2->first[f] + t2->count[f]; x++) {
       const rm_lid t = t2->crossing[x].triangle / 2;
       const int    s = t2->crossing[x].triangle & 1 ? -1 : 1;
       for (rm_lid k = m2->star_offset[f]; k < m2->star_offset[f + 1]; k++)
-        end[offset[t + 1]++] = (rm_end){m2->star[k] / 4, 4 * (uint32_t)x + 2 + (along(m2->star[k]) * s > 0)};
+        end[offset[t + 1]++] = end_word(m2->star[k] / 4, x, 1, along(m2->star[k]) * s > 0);
     }
   o->end_offset = offset;
-  o->end        = end;
+  *out          = end;
   return REMAP_OK;
 }
 
-static inline bool comes_after(rm_end a, rm_end b) { return a.other != b.other ? a.other > b.other : (a.at & 1) > (b.at & 1); }
-
-/* Sort the ends of every triangle; false if one segment has not exactly one start and one end, *bad is then its triangle. */
-static bool pair_ends(const rm_overlay *o, rm_end *end, rm_lid *bad)
+/* Sort the ends of every triangle, by the other triangle and starts first, and make of their words what they are: in place. False if
+ * one segment has not exactly one start and one end, *bad is then its triangle. */
+static bool pair_ends(const rm_overlay *o, uint64_t *word, rm_lid *bad)
 {
   for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++) {
     const int64_t first = o->end_offset[t], last = o->end_offset[t + 1];
 
-    for (int64_t i = first + 1; i < last; i++) {
-      const rm_end x = end[i];
-      int64_t      k = i;
-      for (; k > first && comes_after(end[k - 1], x); k--) end[k] = end[k - 1];
-      end[k] = x;
-    }
     *bad = t;
     if ((last - first) & 1) return false;
+    rm_sort_words(word + first, last - first);
     for (int64_t i = first; i < last; i += 2) {
-      if (end[i].other != end[i + 1].other || (end[i].at & 1) || !(end[i + 1].at & 1)) return false;
-      if (i + 2 < last && end[i + 2].other == end[i].other) return false;
+      if (word[i] >> 32 != word[i + 1] >> 32 || word[i] & LAST || !(word[i + 1] & LAST)) return false;
+      if (i + 2 < last && word[i + 2] >> 32 == word[i] >> 32) return false;
+    }
+    for (int64_t i = first; i < last; i++) {
+      const rm_end end = {(rm_lid)(word[i] >> 32), (uint32_t)word[i] << 1 | (word[i] & LAST ? 1 : 0)};
+      memcpy(&word[i], &end, sizeof end);
     }
   }
   return true;
@@ -81,7 +88,8 @@ static rm_gid cell_beside(const rm_trimesh *m, const rm_piece *piece, rm_lid t)
 static remap_status overlay(rm_arena *arena, rm_overlay *o, const rm_part *part, bool by_tree, const rm_progress *progress,
                             rm_reason *reason)
 {
-  rm_lid bad = 0;
+  rm_lid    bad = 0;
+  uint64_t *word;
 
   for (int side = 0; side < 2; side++) {
     const rm_trimesh  *m = o->mesh[side];
@@ -93,10 +101,11 @@ static remap_status overlay(rm_arena *arena, rm_overlay *o, const rm_part *part,
     RM_TRY(status);
     if (o->trace[side].num_crossings > MAX_CROSSINGS) return REMAP_TOO_LARGE;
   }
-  RM_TRY(file_ends(arena, o));
-  if (!pair_ends(o, (rm_end *)o->end, &bad))
+  RM_TRY(file_ends(arena, o, &word));
+  if (!pair_ends(o, word, &bad))
     return rm_fail(REMAP_INCONSISTENT, reason, REMAP_SOURCE, cell_beside(o->mesh[0], &part->piece[0], bad),
                    "a face of this cell meets the other mesh in a segment without two ends; please report both meshes");
+  o->end = (const rm_end *)(const void *)word; /* that is what it holds by now */
   return REMAP_OK;
 }
 

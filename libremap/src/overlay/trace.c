@@ -51,6 +51,7 @@ typedef struct tracer {
   hit              *skin_hits; /* crossings of the present edge with the skin, ascending along it */
   int64_t           skin_room;
   int               num_skin; /* -1: not asked for yet */
+  int               skin_behind; /* so many of them lie behind the walk */
   const double     *tried;       /* start of the edge for which clear was sought last */
   double            clear[6];    /* a box that no skin enters                         */
   rm_crossing      *crossing;
@@ -78,7 +79,8 @@ static void set_line(tracer *t, const double *p0, const double *p1)
   t->turn    = t->u[k] < 0 ? -1 : 1;
   t->shear[0] = t->u[t->axis[0]] / t->u[k];
   t->shear[1] = t->u[t->axis[1]] / t->u[k];
-  t->num_skin = -1;
+  t->num_skin    = -1;
+  t->skin_behind = 0;
 }
 
 static int edge_side(const tracer *t, rm_lid f)
@@ -147,18 +149,41 @@ static int order(const tracer *t, rm_lid a, rm_lid b)
 }
 
 /* Crossings at exactly one place keep the order of triangles, which is canonical. */
+static bool comes_before(const tracer *t, hit a, hit b)
+{
+  const int o = order(t, a.triangle, b.triangle);
+  return o < 0 || (o == 0 && a.triangle < b.triangle);
+}
+
+/* Put x into the heap of n hits whose root `at` is free. */
+static void sift_hit(const tracer *t, hit *h, int at, int n, hit x)
+{
+  for (int child; (child = 2 * at + 1) < n; at = child) {
+    if (child + 1 < n && comes_before(t, h[child], h[child + 1])) child++;
+    if (!comes_before(t, x, h[child])) break;
+    h[at] = h[child];
+  }
+  h[at] = x;
+}
+
+enum { FEW_HITS = 16 };
+
+/* Few by insertion, many by a heap: an edge may cross a hundred thousand triangles. */
 static void sort_hits(const tracer *t, hit *h, int n)
 {
-  for (int i = 1; i < n; i++) {
+  for (int i = 1; i < n && n <= FEW_HITS; i++) {
     const hit x = h[i];
     int       k = i;
-    while (k > 0) {
-      const int o = order(t, h[k - 1].triangle, x.triangle);
-      if (o < 0 || (o == 0 && h[k - 1].triangle < x.triangle)) break;
-      h[k] = h[k - 1];
-      k--;
-    }
+    for (; k > 0 && comes_before(t, x, h[k - 1]); k--) h[k] = h[k - 1];
     h[k] = x;
+  }
+  if (n <= FEW_HITS) return;
+  for (int i = n / 2; i-- > 0;) sift_hit(t, h, i, n, h[i]);
+  for (int i = n; i-- > 1;) {
+    const hit x = h[i];
+
+    h[i] = h[0];
+    sift_hit(t, h, 0, i, x);
   }
 }
 
@@ -416,10 +441,10 @@ static ahead leave_cell(const tracer *t, rm_lid c, hit last, hit *next)
 }
 
 /* Where the walk meets the skin again from outside. */
-static ahead enter_mesh(const tracer *t, hit last, hit *next)
+static ahead enter_mesh(tracer *t, hit last, hit *next)
 {
-  for (int k = 0; k < t->num_skin; k++) {
-    const hit h = t->skin_hits[k];
+  for (; t->skin_behind < t->num_skin; t->skin_behind++) {
+    const hit h = t->skin_hits[t->skin_behind];
     if (last.triangle >= 0) {
       const int o = order(t, last.triangle, h.triangle);
       if (h.triangle == last.triangle || o > 0) continue;

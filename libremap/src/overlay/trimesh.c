@@ -88,6 +88,36 @@ static int compare_points(const double a[3], const double b[3])
   return 0;
 }
 
+/* A double's bits, such that they ascend with it. */
+static uint64_t ascending(double x)
+{
+  uint64_t bits;
+
+  memcpy(&bits, &x, sizeof bits);
+  return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
+}
+
+/* Sort n points of equal key by their coordinates: few by insertion, many by one coordinate after the other. */
+static void sort_ties(const builder *b, rm_keyed *tie, rm_keyed *spare, int64_t n)
+{
+  const uint64_t key = tie[0].key;
+
+  if (n > RM_FEW_WORDS) {
+    for (int c = 2; c >= 0; c--) {
+      for (int64_t i = 0; i < n; i++) tie[i].key = ascending(b->point[tie[i].item][c]);
+      rm_sort_keyed(tie, spare, n);
+    }
+    for (int64_t i = 0; i < n; i++) tie[i].key = key;
+    return;
+  }
+  for (int64_t i = 1; i < n; i++) {
+    const rm_keyed x = tie[i];
+    int64_t        k = i;
+    for (; k > 0 && compare_points(b->point[tie[k - 1].item], b->point[x.item]) > 0; k--) tie[k] = tie[k - 1];
+    tie[k] = x;
+  }
+}
+
 /* Sorted distinct points become vertices; vertex_of[point]. */
 static remap_status number_vertices(rm_arena *arena, builder *b, rm_lid *vertex_of, rm_trimesh *m)
 {
@@ -104,14 +134,9 @@ static remap_status number_vertices(rm_arena *arena, builder *b, rm_lid *vertex_
     key[i] = (rm_keyed){rm_morton(b->frame, b->point[i]), i};
   }
   rm_sort_keyed(key, spare, n);
-  for (int64_t i = 1; i < n; i++) { /* ties by coordinates; nearly sorted, so insertion */
-    const rm_keyed x = key[i];
-    int64_t        k = i;
-    while (k > 0 && key[k - 1].key == x.key && compare_points(b->point[key[k - 1].item], b->point[x.item]) > 0) {
-      key[k] = key[k - 1];
-      k--;
-    }
-    key[k] = x;
+  for (int64_t i = 0, end; i < n; i = end) {
+    for (end = i + 1; end < n && key[end].key == key[i].key; end++) continue;
+    if (end > i + 1) sort_ties(b, key + i, spare, end - i);
   }
   RM_NEW(vertex, arena, n);
   for (int64_t i = 0; i < n; i++) {
@@ -126,11 +151,33 @@ static remap_status number_vertices(rm_arena *arena, builder *b, rm_lid *vertex_
 
 /* ---- triangles --------------------------------------------------------------------------------------------------- */
 
-static int compare_triples(const corner_triple *a, const corner_triple *b)
+/* Of triangles with one lowest vertex, the rest of their order. */
+static uint64_t order_of(const corner_triple *t)
 {
-  if (a->v[1] != b->v[1]) return a->v[1] < b->v[1] ? -1 : 1;
-  if (a->v[2] != b->v[2]) return a->v[2] < b->v[2] ? -1 : 1;
-  return (int)a->right - (int)b->right;
+  return (uint64_t)t->v[1] << 32 | (uint64_t)t->v[2] << 1 | t->right;
+}
+
+/* Sort n triples by their order, stable: few by insertion, many by way of their keys. */
+static remap_status sort_triples(rm_arena *scratch, corner_triple *triple, int64_t n)
+{
+  rm_keyed      *key, *spare;
+  corner_triple *copy;
+
+  for (int64_t i = 1; i < n && n <= RM_FEW_WORDS; i++) {
+    const corner_triple x = triple[i];
+    int64_t             k = i;
+    for (; k > 0 && order_of(&triple[k - 1]) > order_of(&x); k--) triple[k] = triple[k - 1];
+    triple[k] = x;
+  }
+  if (n <= RM_FEW_WORDS) return REMAP_OK;
+  RM_NEW(key, scratch, n);
+  RM_NEW(spare, scratch, n);
+  RM_NEW(copy, scratch, n);
+  for (int64_t i = 0; i < n; i++) key[i] = (rm_keyed){order_of(&triple[i]), i};
+  rm_sort_keyed(key, spare, n);
+  memcpy(copy, triple, sizeof *copy * (size_t)n);
+  for (int64_t i = 0; i < n; i++) triple[i] = copy[key[i].item];
+  return REMAP_OK;
 }
 
 /* Every triangle once per cell beside it, bucketed by its lowest vertex and sorted within the bucket. */
@@ -165,16 +212,7 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
       if (t.cell >= 0) triple[offset[t.v[0] + 1]++] = t;
     }
   }
-  for (rm_lid v = 0; v < num_vertices; v++)
-    for (int64_t i = offset[v] + 1; i < offset[v + 1]; i++) {
-      const corner_triple x = triple[i];
-      int64_t             k = i;
-      while (k > offset[v] && compare_triples(&triple[k - 1], &x) > 0) {
-        triple[k] = triple[k - 1];
-        k--;
-      }
-      triple[k] = x;
-    }
+  for (rm_lid v = 0; v < num_vertices; v++) RM_TRY(sort_triples(b->scratch, triple + offset[v], offset[v + 1] - offset[v]));
   *out = triple;
   *num = n;
   return REMAP_OK;
@@ -225,18 +263,13 @@ static void triangle_normal(const rm_trimesh *m, rm_lid t, double n[3])
 
 /* ---- edges ------------------------------------------------------------------------------------------------------- */
 
-typedef struct half_edge {
-  rm_lid high; /* upper vertex */
-  rm_lid at;   /* 4 * triangle + h */
-} half_edge;
-
 static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
 {
   static const int low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
   const rm_lid nt = m->num_triangles, nv = m->num_vertices;
   const int64_t n3 = 3 * (int64_t)nt;
   rm_lid (*triangle_edge)[3], (*edge)[2], *star_offset, *star, *offset, ne = 0;
-  half_edge *half;
+  uint64_t *half; /* upper vertex, then 4 * triangle + h, so that they ascend and the triangles of an edge too */
 
   RM_NEW0(offset, scratch, (int64_t)nv + 2);
   RM_NEW(half, scratch, n3);
@@ -244,29 +277,23 @@ static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh 
     for (int h = 0; h < 3; h++) offset[m->triangle[t][low[h]] + 2]++;
   for (rm_lid v = 0; v < nv; v++) offset[v + 2] += offset[v + 1];
   for (rm_lid t = 0; t < nt; t++)
-    for (int h = 0; h < 3; h++) half[offset[m->triangle[t][low[h]] + 1]++] = (half_edge){m->triangle[t][high[h]], 4 * t + h};
+    for (int h = 0; h < 3; h++) half[offset[m->triangle[t][low[h]] + 1]++] = (uint64_t)m->triangle[t][high[h]] << 32 | (uint64_t)(4 * t + h);
   RM_NEW(triangle_edge, arena, nt);
   RM_NEW(edge, arena, n3);
   RM_NEW(star_offset, arena, n3 + 1);
   RM_NEW(star, arena, n3);
   for (rm_lid v = 0; v < nv; v++) {
-    for (rm_lid i = offset[v] + 1; i < offset[v + 1]; i++) { /* stable, so that the triangles of an edge ascend */
-      const half_edge x = half[i];
-      rm_lid          k = i;
-      while (k > offset[v] && half[k - 1].high > x.high) {
-        half[k] = half[k - 1];
-        k--;
-      }
-      half[k] = x;
-    }
+    rm_sort_words(half + offset[v], offset[v + 1] - offset[v]);
     for (rm_lid i = offset[v]; i < offset[v + 1]; i++) {
-      if (i == offset[v] || half[i].high != half[i - 1].high) {
+      const rm_lid at = (rm_lid)(uint32_t)half[i];
+
+      if (i == offset[v] || half[i] >> 32 != half[i - 1] >> 32) {
         star_offset[ne] = i;
         edge[ne][0]     = v;
-        edge[ne++][1]   = half[i].high;
+        edge[ne++][1]   = (rm_lid)(half[i] >> 32);
       }
-      star[i] = half[i].at;
-      triangle_edge[half[i].at / 4][half[i].at % 4] = ne - 1;
+      star[i] = at;
+      triangle_edge[at / 4][at % 4] = ne - 1;
     }
   }
   star_offset[ne]  = (rm_lid)n3;
@@ -409,47 +436,45 @@ static remap_status collect_skin(rm_arena *arena, rm_trimesh *m)
   return rm_boxtree_build(arena, n, m->skin_box, &m->skin_tree);
 }
 
+static bool is_skin(const rm_trimesh *m, rm_lid t) { return m->side[t][0] < 0 || m->side[t][1] < 0; }
+
+/* Skin triangles round vertex v from triangle t on, edge by edge, until t is back; every skin edge at v has two of them. */
+static rm_lid skin_round(const rm_trimesh *m, rm_lid v, rm_lid t)
+{
+  rm_lid num = 0, at = t, edge = -1;
+
+  do {
+    int h = 0;
+    while (m->triangle_edge[at][h] == edge || (m->edge[m->triangle_edge[at][h]][0] != v && m->edge[m->triangle_edge[at][h]][1] != v)) h++;
+    edge = m->triangle_edge[at][h];
+    rm_lid k = m->star_offset[edge];
+    while (m->star[k] / 4 == at || !is_skin(m, m->star[k] / 4)) k++;
+    at = m->star[k] / 4;
+    num++;
+  } while (at != t);
+  return num;
+}
+
 /* Mark every vertex about which the skin closes more than once, or an edge of which has not two skin triangles: there, cells that
- * share a vertex need not be neighbours. A skin triangle hangs on the others at a vertex through its two edges there. */
+ * share a vertex need not be neighbours. O(triangles at edges of the skin). */
 static remap_status pinched_vertices(rm_arena *scratch, const rm_trimesh *m, uint8_t *pinched)
 {
-  rm_lid *offset, *list, *seen;
+  rm_lid *num, *one; /* skin triangles at a vertex, and one of them */
 
-  RM_NEW0(offset, scratch, (int64_t)m->num_vertices + 2);
-  RM_NEW(list, scratch, 3 * (int64_t)m->num_skin);
-  RM_NEW(seen, scratch, 3 * (int64_t)m->num_skin);
-  for (rm_lid s = 0; s < m->num_skin; s++)
-    for (int h = 0; h < 3; h++) offset[m->triangle[m->skin[s]][h] + 2]++;
-  for (rm_lid v = 0; v < m->num_vertices; v++) offset[v + 2] += offset[v + 1];
-  for (rm_lid s = 0; s < m->num_skin; s++)
-    for (int h = 0; h < 3; h++) list[offset[m->triangle[m->skin[s]][h] + 1]++] = m->skin[s];
+  RM_NEW0(num, scratch, m->num_vertices);
+  RM_NEW(one, scratch, m->num_vertices);
   for (rm_lid s = 0; s < m->num_skin; s++)
     for (int h = 0; h < 3; h++) {
-      const rm_lid e = m->triangle_edge[m->skin[s]][h];
+      const rm_lid t = m->skin[s], e = m->triangle_edge[t][h];
       int          n = 0;
-      for (rm_lid k = m->star_offset[e]; k < m->star_offset[e + 1]; k++)
-        n += m->side[m->star[k] / 4][0] < 0 || m->side[m->star[k] / 4][1] < 0;
+
+      num[m->triangle[t][h]]++;
+      one[m->triangle[t][h]] = t;
+      for (rm_lid k = m->star_offset[e]; k < m->star_offset[e + 1]; k++) n += is_skin(m, m->star[k] / 4);
       if (n != 2) pinched[m->edge[e][0]] = pinched[m->edge[e][1]] = 1;
     }
-  for (rm_lid v = 0; v < m->num_vertices; v++) {
-    const rm_lid *own = list + offset[v], n = offset[v + 1] - offset[v];
-    rm_lid       *queue = seen, reached = 1;
-
-    if (n < 2 || pinched[v]) continue;
-    queue[0] = own[0];
-    for (rm_lid q = 0; q < reached; q++)
-      for (rm_lid k = 0; k < n; k++) {
-        int    shared = 0, known = 0;
-        for (int g = 0; g < 3; g++)
-          for (int h = 0; h < 3; h++)
-            shared += m->triangle_edge[queue[q]][g] == m->triangle_edge[own[k]][h] &&
-                      (m->edge[m->triangle_edge[own[k]][h]][0] == v || m->edge[m->triangle_edge[own[k]][h]][1] == v);
-        if (!shared) continue;
-        for (rm_lid r = 0; r < reached; r++) known |= queue[r] == own[k];
-        if (!known) queue[reached++] = own[k];
-      }
-    if (reached < n) pinched[v] = 1;
-  }
+  for (rm_lid v = 0; v < m->num_vertices; v++)
+    if (num[v] > 1 && !pinched[v] && skin_round(m, v, one[v]) < num[v]) pinched[v] = 1;
   return REMAP_OK;
 }
 
@@ -458,7 +483,10 @@ static remap_status pinched_vertices(rm_arena *scratch, const rm_trimesh *m, uin
 typedef struct nearness {
   const rm_trimesh *m;
   rm_lid            cell;
+  int               patience; /* so many more triangles are looked at */
 } nearness;
+
+enum { PATIENCE = 512 };
 
 /* Height of a point over a triangle's plane, times the normal's magnitude. */
 static double height(const rm_trimesh *m, rm_lid t, const double p[3])
@@ -500,15 +528,17 @@ static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
 }
 
 /* The skin triangle belongs to a cell that shares no vertex with this one, and may enter it. (Cells that share a vertex which is
- * not pinched are neighbours in the mesh.) */
+ * not pinched are neighbours in the mesh.) Where very many triangles are near, as where thousands of cells meet, that is taken for
+ * granted. */
 static int is_foreign_skin(void *user, rm_lid s)
 {
-  const nearness   *near  = user;
+  nearness         *near  = user;
   const rm_trimesh *m     = near->m;
   const rm_lid     *side  = m->side[m->skin[s]];
   const rm_lid      owner = side[0] >= 0 ? side[0] : side[1];
 
   if (owner == near->cell) return 0;
+  if (near->patience-- == 0) return 1;
   for (rm_lid k = m->cell_vertex_offset[near->cell]; k < m->cell_vertex_offset[near->cell + 1]; k++)
     for (rm_lid l = m->cell_vertex_offset[owner]; l < m->cell_vertex_offset[owner + 1]; l++)
       if (m->cell_vertex[k] == m->cell_vertex[l]) return 0;
@@ -550,12 +580,12 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
   RM_TRY(pinched_vertices(scratch, m, pinched));
   for (rm_lid c = 0; c < m->num_cells; c++) {
     const bool is_large = m->cell_vertex_offset[c] == m->cell_vertex_offset[c + 1];
-    nearness   near = {m, c};
+    nearness   near     = {m, c, PATIENCE};
 
     for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++)
       if (pinched[m->cell_vertex[k]]) walk[c] = RM_WALK_TOGETHER;
-    if (!walk[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) walk[c] = RM_WALK_TOGETHER;
     if (is_large) walk[c] = RM_WALK_NOT;
+    if (!walk[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) walk[c] = RM_WALK_TOGETHER;
     if (is_large ? m->num_cells > 1 : !is_star_shaped(m, c)) {
       walk[c] = RM_WALK_NOT;
       memcpy(odd_box[num_odd++], m->cell_box[c], sizeof *odd_box);
