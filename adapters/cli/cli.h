@@ -7,6 +7,7 @@
  *   volumes.c   cell volumes of the solvers
  *   coverage.c  how much of the cells is covered
  *   check.c     --check
+ *   supermesh.c --supermesh
  *   job.c       what these share
  *   options.c   the command line
  *   report.c    text for people, JSON for programs

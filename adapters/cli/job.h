@@ -96,6 +96,10 @@ cli_exit cli_masks_settle(cli_job *j, cli_failure *why);
  *  something that a solver can read. With --on-uncovered fill=VALUE they get that. Collective. */
 void cli_masks_fill(cli_job *j);
 
+/** Write the supermesh that was asked for, after remap_build: fills supermesh of the report. Collective. Errors: GEOMETRY, IO,
+ *  INTERNAL. */
+cli_exit cli_supermesh_write(cli_job *j, cli_failure *why);
+
 /** remap --check: transfer known fields, put the figures into the report and, unless quiet, print them. After the masks.
  *  Collective. Errors: VERIFY (a figure fails), COVERAGE (the meshes do not meet), INTERNAL. */
 cli_exit cli_check(cli_job *j, cli_failure *why);

@@ -102,15 +102,20 @@ static cli_exit check_new_file(cli_job *j, const char *path, cli_failure *why)
 static cli_exit check_outputs(cli_job *j, cli_failure *why)
 {
   const cli_options *options    = &j->options;
-  const char        *psi        = options->source_coverage;
-  const char *const  others[4]  = {options->path[REMAP_SOURCE], options->path[REMAP_TARGET], options->output, psi};
-  const int          num_others = psi ? 4 : options->output ? 3 : 2;
+  const char *const  file[3]    = {options->output, options->source_coverage, options->supermesh};
+  const char *const  word[3]    = {"-o", "--source-coverage", "--supermesh"};
+  const char        *others[5]  = {options->path[REMAP_SOURCE], options->path[REMAP_TARGET]};
+  int                num_others = 2;
   cli_exit           mine       = CLI_DONE;
 
-  if (options->output) CLI_TRY(check_new_file(j, options->output, why));
-  if (psi) CLI_TRY(check_new_file(j, psi, why));
-  if (psi && j->rank == 0 && cli_is_same_file(psi, options->output))
-    mine = cli_fail(why, CLI_USAGE, "%s: it is used already: give --source-coverage another file", psi);
+  for (int i = 0; i < 3; i++) {
+    if (!file[i]) continue;
+    CLI_TRY(check_new_file(j, file[i], why));
+    for (int k = 2; k < num_others && j->rank == 0 && mine == CLI_DONE; k++)
+      if (cli_is_same_file(file[i], others[k]))
+        mine = cli_fail(why, CLI_USAGE, "%s: it is used already: give %s another file", file[i], word[i]);
+    others[num_others++] = file[i];
+  }
   if (mine == CLI_DONE && options->report && j->rank == 0)
     mine = cli_report_open(options->report, num_others, others, &j->report_file, why);
   return cli_agree(j, mine, why);
@@ -320,6 +325,7 @@ static cli_exit run(cli_job *j, cli_failure *why)
   if (speaks) cli_report_fields(stdout, &j->report);
   verified = verify(j, why);
   if (verified != CLI_DONE) return report_even_if(j, verified, why);
+  if (j->options.supermesh) CLI_TRY(cli_supermesh_write(j, why));
   CLI_TRY(write_output(j, why));
   return finish_report(j, why);
 }

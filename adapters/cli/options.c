@@ -65,6 +65,8 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
   X(KEEP_VECTORS, 0, "keep-vectors", NULL, AT(keep_vectors),                                                                  \
     "do not turn velocities and other vectors when that is a rotation")                                                       \
   X(CHECK, 0, "check", NULL, AT(check), "transfer known fields and say how well: PASS or FAIL; no OUTPUT")                    \
+  X(SUPERMESH, 0, "supermesh", "FILE", AT(supermesh),                                                                         \
+    "write the common parts of the cells too, as polyhedra with their\nancestors: CGNS, or VTK if FILE ends in .vtu")         \
   X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                  \
   X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                         \
   X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                                \
@@ -310,7 +312,7 @@ static cli_exit add_path(cli_options *out, int *num_paths, const char *path, cli
 static cli_exit check_whole(const cli_options *out, int num_paths, cli_failure *why)
 {
   if (num_paths < 2) return cli_fail(why, CLI_USAGE, "two files are needed: give SOURCE TARGET -o OUTPUT, see remap --help");
-  if (out->check && (out->output || out->source_coverage))
+  if (out->check && (out->output || out->source_coverage || out->supermesh))
     return cli_fail(why, CLI_USAGE, "--check writes no fields: leave -o and --source-coverage out");
   if (!out->check && !out->output) return cli_fail(why, CLI_USAGE, "no file to write: give -o OUTPUT, see remap --help");
   if (out->solution && out->step)

@@ -26,6 +26,7 @@ typedef struct cli_options {
   const char    *solution, *output_solution;
   const char    *transform;       /**< path of a 3x4 matrix */
   const char    *source_coverage; /**< the file to write with psi */
+  const char    *supermesh;       /**< the file to write with the cells' common parts */
   bool           check;           /**< try the two meshes, write nothing */
   bool           coverage;        /**< write phi into OUTPUT */
   int64_t        step;            /**< 1 ..; -1 the last; 0 not given */

@@ -164,6 +164,8 @@ void cli_report_end(FILE *out, const cli_report *report)
           report->seconds_read, stats->seconds_partition, stats->seconds_overlay, report->seconds_transfer,
           report->seconds_write, report->seconds_total);
   fprintf(out, "memory  %.1f MB on the rank that needs most\n", 1e-6 * (double)report->peak_rss);
+  if (report->supermesh.path)
+    fprintf(out, "output  %s, supermesh of %lld cells\n", report->supermesh.path, (long long)report->supermesh.cells);
   if (report->source_coverage) fprintf(out, "output  %s, coverage of SOURCE\n", report->source_coverage);
   if (report->output) fprintf(out, "output  %s, fields in %s\n", report->output, report->solution[REMAP_TARGET]);
   fflush(out);
@@ -297,22 +299,30 @@ static json_t *check_json(const cli_report *report)
   return list;
 }
 
+static json_t *supermesh_json(const cli_supermesh_row *row)
+{
+  return json_pack("{s:o, s:I, s:o}", "file", words(row->path), "cells", (json_int_t)row->cells, "volume", real(row->volume));
+}
+
 /* The whole report; NULL if memory is out. The caller ends it with json_decref. */
 static json_t *report_json(const cli_report *report)
 {
   const remap_stats *stats  = &report->stats;
-  json_t            *fields = json_array(), *notes = json_array();
+  json_t            *fields = json_array(), *notes = json_array(), *report_object;
 
   for (int i = 0; i < report->num_fields; i++) json_array_append_new(fields, field_json(&report->field[i]));
   for (int i = 0; i < report->num_notes; i++) json_array_append_new(notes, words(report->note[i]));
-  return json_pack("{s:s, s:i, s:o, s:o, s:o, s:{s:o, s:o}, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}",
-                   "version", remap_version(), "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target",
-                   side_json(report, REMAP_TARGET), "overlap", overlap_json(stats), "coverage", "source",
-                   cover_json(report, REMAP_SOURCE), "target", cover_json(report, REMAP_TARGET), "fields", fields, "check",
-                   check_json(report), "time", "read", real(report->seconds_read), "partition", real(stats->seconds_partition),
-                   "overlay", real(stats->seconds_overlay), "transfer", real(report->seconds_transfer), "write",
-                   real(report->seconds_write), "total", real(report->seconds_total), "memory", "peak_rss_bytes_max",
-                   (json_int_t)report->peak_rss, "notes", notes);
+  report_object = json_pack(
+      "{s:s, s:i, s:o, s:o, s:o, s:{s:o, s:o}, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o, s:o}, s:{s:I}, s:o}", "version",
+      remap_version(), "ranks", stats->ranks, "source", side_json(report, REMAP_SOURCE), "target",
+      side_json(report, REMAP_TARGET), "overlap", overlap_json(stats), "coverage", "source", cover_json(report, REMAP_SOURCE),
+      "target", cover_json(report, REMAP_TARGET), "fields", fields, "check", check_json(report), "time", "read",
+      real(report->seconds_read), "partition", real(stats->seconds_partition), "overlay", real(stats->seconds_overlay),
+      "transfer", real(report->seconds_transfer), "write", real(report->seconds_write), "total", real(report->seconds_total),
+      "memory", "peak_rss_bytes_max", (json_int_t)report->peak_rss, "notes", notes);
+  if (report_object && report->supermesh.path)
+    json_object_set_new(report_object, "supermesh", supermesh_json(&report->supermesh));
+  return report_object;
 }
 
 /* ---- the file ----------------------------------------------------------------------------------------------------- */

@@ -57,11 +57,19 @@ typedef struct cli_cover_row {
   remap_partial_cell uncovered[CLI_WORST]; /**< [num_uncovered] the largest ones */
 } cli_cover_row;
 
+/** The supermesh that was written. */
+typedef struct cli_supermesh_row {
+  const char *path; /**< NULL: none */
+  int64_t     cells;
+  double      volume;
+} cli_supermesh_row;
+
 /** Everything there is to tell; texts are borrowed. */
 typedef struct cli_report {
   const rcgns_info    *info[2]; /**< [remap_side] */
   remap_stats          stats;
-  const char          *solution[2];              /**< [remap_side] names of the FlowSolution_t read and written */
+  const char          *solution[2]; /**< [remap_side] names of the FlowSolution_t read and written */
+  cli_supermesh_row    supermesh;
   const char          *output, *source_coverage; /**< files that were written, NULL if not */
   const char          *volume[2];                /**< [remap_side] field of the solver's volumes, NULL: none */
   const char          *mask[2];                  /**< [remap_side] as asked for, NULL: none */
