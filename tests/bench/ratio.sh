@@ -1,34 +1,45 @@
 #!/bin/sh
-# ratio.sh -- the overlay's time per cell beside that of the float prototype overlay_floor.c, run in turn, medians of user CPU.
+# ratio.sh -- the overlay's speed as ratios that machines share: beside the float prototype overlay_floor.c, case beside case, small
+# beside large. Programs run in turn, RUNS times; medians of processor time. Prints a table in Markdown.
 #
 #   tests/bench/ratio.sh BUILD [PROTOTYPE.c] [RUNS]
 #
-# BUILD is the build folder; PROTOTYPE.c defaults to ../shared/bench/overlay_floor.c beside the project. One JSON line per kind of
-# triangulation: microseconds per cell of mesh 1 (32^3 warped hexahedra in 64^3), their ratio, and the whole remap_build.
+# BUILD is the build folder; PROTOTYPE.c defaults to ../shared/bench/overlay_floor.c beside the project, and rows that need it are left
+# out without it. RUNS defaults to 5. Takes about a minute and 2 GB.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 build=${1:?usage: ratio.sh BUILD [PROTOTYPE.c] [RUNS]}
 floor=${2:-$here/../../../shared/bench/overlay_floor.c}
 runs=${3:-5}
-if [ ! -f "$floor" ]; then
-  echo "ratio.sh: no prototype at $floor: name it as the second argument" >&2
-  exit 77
-fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-gcc -O3 -march=native -o "$work/floor" "$floor" -lm
+[ ! -f "$floor" ] || gcc -O3 -march=native -o "$work/floor" "$floor" -lm
 
-# The middle one of the lines of standard input.
-median() { sort -g | awk '{ x[NR] = $1 } END { print x[int((NR + 1) / 2)] }'; }
-
-export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-for faces in diagonal centre; do
-  for i in $(seq "$runs"); do
-    "$work/floor" 32 64 0.5 $faces | sed -n 's/.*together //p' >>"$work/floor.$faces"
-    "$build/tests/bench_overlay" warped 32 $faces | sed 's/.*"us_overlay":\([0-9.]*\).*/\1/' >>"$work/ours.$faces"
-    mpirun -n 1 "$build/tests/bench_build" 32 64 0.5 $faces | sed 's/.*"us_build_per_source_cell":\([0-9.]*\).*/\1/' >>"$work/build.$faces"
+for i in $(seq "$runs"); do
+  for faces in diagonal centre; do
+    [ ! -x "$work/floor" ] || "$work/floor" 32 64 0.5 $faces | sed -n 's/.*together //p' >>"$work/floor-$faces"
+    "$build/tests/bench_overlay" warped 32 $faces >>"$work/warped-32-$faces"
   done
-  a=$(median <"$work/floor.$faces") b=$(median <"$work/ours.$faces") c=$(median <"$work/build.$faces")
-  awk -v f=$faces -v a="$a" -v b="$b" -v c="$c" -v n="$runs" 'BEGIN {
-    printf "{\"bench\":\"ratio\",\"faces\":\"%s\",\"runs\":%d,\"us_prototype\":%s,\"us_overlay\":%s,\"ratio\":%.2f,\"us_whole_build\":%s}\n", f, n, a, b, b / a, c }'
+  for run in general-16 general-24 identical-24 finer-16 nested-16 boxes-32 tetrahedra-16 dual-16 general-64; do
+    "$build/tests/bench_overlay" "${run%-*}" "${run#*-}" diagonal >>"$work/$run-diagonal"
+  done
 done
+
+# The middle one of the numbers of standard input; that of a field in the runs of a case; a ratio of two cases; a row of the table.
+median() { sort -g | awk '{ x[NR] = $1 } END { print x[int((NR + 1) / 2)] }'; }
+of() { sed "s/.*\"$2\":\([0-9.]*\).*/\1/" "$work/$1" | median; }
+row() { awk -v name="$1" -v unit="$2" -v a="$3" -v b="$4" -v bar="$5" -v stretch="$6" 'BEGIN {
+  printf "| %s | %s | %.3g | %.3g | %.2f | %s | %s |\n", name, unit, a, b, a / b, bar, stretch }'; }
+
+echo "| case | unit | it | against | ratio | bar | stretch |"
+echo "|---|---|---|---|---|---|---|"
+if [ -x "$work/floor" ]; then
+  row "warped hexahedra, diagonal, against the prototype" "us/cell" "$(of warped-32-diagonal us_overlay)" "$(median <"$work/floor-diagonal")" 1.5 0.7
+  row "the same, centre" "us/cell" "$(of warped-32-centre us_overlay)" "$(median <"$work/floor-centre")" 1.0 0.5
+fi
+row "planar boxes, against warped diagonal" "us/cell" "$(of boxes-32-diagonal us_overlay)" "$(of warped-32-diagonal us_overlay)" 0.6 0.35
+row "identical meshes, against general ones of that size" "us/cell" "$(of identical-24-diagonal us_overlay)" "$(of general-24-diagonal us_overlay)" 3 1.5
+row "nested meshes, against general ones of those sizes" "us/cell" "$(of nested-16-diagonal us_overlay)" "$(of finer-16-diagonal us_overlay)" 3 1.5
+row "tetrahedra, against warped diagonal" "us/pair" "$(of tetrahedra-16-diagonal us_per_pair)" "$(of warped-32-diagonal us_per_pair)" 1.0 0.8
+row "polyhedra (dual), against warped diagonal" "us/pair" "$(of dual-16-diagonal us_per_pair)" "$(of warped-32-diagonal us_per_pair)" - -
+row "64^3, against 16^3" "us/cell" "$(of general-64-diagonal us_overlay)" "$(of general-16-diagonal us_overlay)" 1.35 1.15
