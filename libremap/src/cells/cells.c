@@ -120,8 +120,8 @@ typedef struct face {
 typedef void visitor(work *w, const face *f, void *user);
 
 /* Visit the face, or the convex parts of it if it is concave and that is wanted. Its loop runs counter-clockwise about its triangle's
- * normal, or the other way (reversed). */
-static void visit_face(work *w, const face *f, bool reversed, visitor *visit, void *user)
+ * normal. */
+static void visit_face(work *w, const face *f, visitor *visit, void *user)
 {
   face part = *f;
 
@@ -129,8 +129,7 @@ static void visit_face(work *w, const face *f, bool reversed, visitor *visit, vo
     visit(w, f, user);
     return;
   }
-  rm_view view = rm_view_of(w->l, f->of->own & 1, f->of->own / 2);
-  if (reversed) view.flip = -view.flip;
+  const rm_view view = rm_view_of(w->l, f->of->own & 1, f->of->own / 2);
   if (rm_is_convex(&view, f->vertex, f->num)) {
     visit(w, f, user);
     return;
@@ -140,6 +139,14 @@ static void visit_face(work *w, const face *f, bool reversed, visitor *visit, vo
     part.vertex = w->parts.vertex + (k ? w->parts.end[k - 1] : 0);
     part.num    = w->parts.end[k] - (k ? w->parts.end[k - 1] : 0);
     visit(w, &part, user);
+  }
+}
+
+static void reverse(rm_lid *loop, rm_lid n)
+{
+  for (rm_lid i = 0, k = n - 1; i < k; i++, k--) {
+    const rm_lid x = loop[i];
+    loop[i] = loop[k], loop[k] = x;
   }
 }
 
@@ -154,12 +161,11 @@ static remap_status each_face(work *w, visitor *visit, void *user)
 
     if (!cells_beside(w, first, f.cell, &f.turned)) continue;
     f.num = n > 1 ? rm_face_loop(&w->faces, &w->p, &w->glued, k, w->loop) : 0;
-    if (f.num) { /* the loop runs as that of a polygon which is not turned */
-      const bool reversed = rm_is_turned(&w->glued, first);
+    if (f.num) {
+      if (rm_is_turned(&w->glued, first)) reverse(w->loop, f.num); /* it runs as that of a polygon which is not turned */
       f.of     = &w->p.polygon[first];
       f.vertex = w->loop;
-      f.turned = f.turned != reversed;
-      visit_face(w, &f, reversed, visit, user);
+      visit_face(w, &f, visit, user);
       continue;
     }
     for (int64_t i = 0; i < n && w->status == REMAP_OK; i++) {
@@ -167,7 +173,7 @@ static remap_status each_face(work *w, visitor *visit, void *user)
       f.of     = &w->p.polygon[member[i]];
       f.vertex = w->p.vertex + f.of->first;
       f.num    = rm_polygon_size(f.of);
-      visit_face(w, &f, false, visit, user);
+      visit_face(w, &f, visit, user);
     }
   }
   return w->status;

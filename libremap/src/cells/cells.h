@@ -51,6 +51,9 @@ typedef struct rm_cells {
   double         seconds_polygons, seconds_glue, seconds_faces;
 } rm_cells;
 
+/* False if the corners of triangle t are on a line. Exact. Not collective. */
+bool rm_has_area(const rm_trimesh *m, rm_lid t);
+
 /* The triangulation without flat triangles, which have their corners on a line: they are left out, and others are cut where such
  * a one had a vertex on their edge, so that what is left is conformal and bounds the same volumes. *out is mesh itself if it has
  * none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */

@@ -66,9 +66,6 @@ static inline bool rm_in_triangle(const rm_limit *l, int side, rm_feature f, rm_
 
 /* ---- exact signs -------------------------------------------------------------------------------------------------- */
 
-/* False if the corners of triangle t are on a line. Exact. */
-bool rm_has_area(const rm_trimesh *m, rm_lid t);
-
 /* A point off the plane of a, b, c, on the side that its normal points to; false if they are on one line. */
 bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3]);
 

@@ -25,7 +25,7 @@ typedef struct builder {
   const double (*box[2])[6];
   uint8_t       *edge_present[2]; /* [side][num_edges] some present triangle has the edge */
   rm_feature    *at[2];           /* [side][num_vertices] where the vertex lies in the other mesh */
-  edge_contact  *contact;         /* ascending by edge[0] */
+  edge_contact  *contact;         /* ascending by edge[0], then by edge[1] */
   int64_t        num_contacts, contact_room;
   rm_lid        *contact_first[2]; /* [side][num_edges + 1] */
   rm_lid        *contact_of[2];    /* contacts of an edge   */
@@ -297,6 +297,17 @@ static remap_status touch_cell(edge_query *q, rm_lid j)
   return q->status;
 }
 
+/* The order in which cells are searched is not that of the mesh: put the contacts of one edge from `first` on into it. */
+static void sort_contacts(builder *b, int64_t first)
+{
+  for (int64_t i = first + 1; i < b->num_contacts; i++) {
+    const edge_contact x = b->contact[i];
+    int64_t            k = i;
+    for (; k > first && b->contact[k - 1].edge[1] > x.edge[1]; k--) b->contact[k] = b->contact[k - 1];
+    b->contact[k] = x;
+  }
+}
+
 static remap_status cross_edges(builder *b)
 {
   const rm_trimesh *m1 = b->l->o->mesh[0];
@@ -310,6 +321,7 @@ static remap_status cross_edges(builder *b)
       set_box(&q, k ? x[k - 1].lambda : 0, k < trace->count[e] ? x[k].lambda : 1);
       RM_TRY(touch_cell(&q, k ? x[k - 1].state : trace->state[e]));
     }
+    sort_contacts(b, q.first);
   }
   for (int side = 0; side < 2; side++) {
     const rm_trimesh *m = b->l->o->mesh[side];

@@ -14,6 +14,7 @@ typedef struct work {
   rm_route              route[2];  /* [side] all that a rank needs                               */
   uint8_t              *met[2];    /* [side][cells] its box meets that of a cell of the other mesh */
   bool                  wanted[2]; /* [side] its cells are core                                  */
+  const bool           *all;       /* [side] every cell counts as met                            */
 } work;
 
 /* Cells cell[0..num) of one mesh to the ranks that hold, by the route, cells of another whose boxes they meet. Collective. */
@@ -43,7 +44,8 @@ static remap_status cut(work *w, const rm_frame *frame)
 static remap_status mark_met(rm_arena *arena, work *w)
 {
   for (int side = 0; side < 2; side++) {
-    RM_NEW0(w->met[side], arena, w->mesh[side]->num_cells);
+    RM_NEW(w->met[side], arena, w->mesh[side]->num_cells);
+    for (rm_lid c = 0; c < w->mesh[side]->num_cells; c++) w->met[side][c] = w->all[side];
     for (int64_t k = 0; k < w->across[side].offset[w->comm->size]; k++) w->met[side][w->across[side].cell[k]] = 1;
   }
   return REMAP_OK;
@@ -165,9 +167,9 @@ static remap_status cover(rm_arena *arena, work *w, const rm_frame *frame, int k
 }
 
 remap_status rm_part_cover(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
-                           const rm_zone *zone, int keep, const rm_cover **out, rm_reason *reason)
+                           const rm_zone *zone, int keep, const bool all[2], const rm_cover **out, rm_reason *reason)
 {
-  work         w   = {.scratch = rm_arena_new(), .comm = comm, .mesh = mesh, .zone = zone, .reason = reason};
+  work         w   = {.scratch = rm_arena_new(), .comm = comm, .mesh = mesh, .zone = zone, .reason = reason, .all = all};
   rm_cover    *new = rm_arena_zero(arena, 1, sizeof *new);
   remap_status status;
 

@@ -9,12 +9,19 @@ typedef struct work {
   rm_arena            *arena;
   const rm_super_job  *job;
   rm_soup             *soup;
+  rm_reason           *reason;
   remap_supermesh_view v;
   int64_t             *face_number, *cell_number;
   rm_lid              *face_at;  /* [faces of the result] of the soup                          */
   rm_lid              *face_twin; /* [faces of the result] the soup's other face that it is, -1 */
   rm_lid              *new_cell; /* [cells of the soup]                                        */
 } work;
+
+static remap_status tangled(const work *w)
+{
+  return rm_fail(REMAP_BAD_MESH, w->reason, -1, -1,
+                 "parts of the supermesh lie on each other: cells of one mesh overlap or are inverted; a supermesh needs cells that do not");
+}
 
 /* ---- vertices ----------------------------------------------------------------------------------------------------------------- */
 
@@ -73,7 +80,9 @@ static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number
   for (int64_t i = 0; i < s->num_vertices; i++) key[i] = (rm_keyed){(uint64_t)number[i], i};
   rm_sort_keyed(key, spare, s->num_vertices);
   for (int64_t i = 0; i < s->num_vertices; i++) {
-    n += i == 0 || key[i].key != key[i - 1].key;
+    const bool again = i > 0 && key[i].key == key[i - 1].key;
+    if (again && key[i].item < s->num_made) return tangled(w); /* the sort is stable: so is the one before */
+    n += !again;
     node_of[key[i].item] = (rm_lid)(n - 1);
   }
   RM_NEW(global, w->arena, n);
@@ -97,7 +106,7 @@ static remap_status do_vertices(work *w, rm_arena *passing)
 
   RM_TRY(rm_comm_agree(w->job->comm, number ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_TRY(number_vertices(w, passing, number));
-  return rm_comm_agree(w->job->comm, make_nodes(w, passing, number), NULL);
+  return rm_comm_agree_reason(w->job->comm, make_nodes(w, passing, number), w->reason);
 }
 
 /* ---- faces -------------------------------------------------------------------------------------------------------------------- */
@@ -162,7 +171,7 @@ static remap_status join_faces(work *w, rm_arena *passing)
     const rm_soup_face *x = &s->face[w->face_at[n - 1]], *y = &s->face[key[f].item];
     if (w->face_twin[n - 1] >= 0 || x->cell[1] >= 0 || y->cell[1] >= 0 ||
         walk_of(s, x - s->face, &a) == walk_of(s, y - s->face, &b))
-      return REMAP_INCONSISTENT;
+      return tangled(w);
     w->face_twin[n - 1] = (rm_lid)key[f].item;
   }
   w->v.num_faces = n;
@@ -328,7 +337,7 @@ static remap_status collect_halves(const work *w, rm_arena *passing, int64_t **o
 }
 
 /* To each of n halves the cell of the other half of its face, -1 if there is none. */
-static remap_status pair_halves(rm_arena *passing, int64_t n, const half *list, int64_t **out)
+static remap_status pair_halves(const work *w, rm_arena *passing, int64_t n, const half *list, int64_t **out)
 {
   rm_keyed *key, *spare;
   int64_t  *other;
@@ -340,7 +349,7 @@ static remap_status pair_halves(rm_arena *passing, int64_t n, const half *list, 
   rm_sort_keyed(key, spare, n);
   for (int64_t k = 0, next; k < n; k = next) {
     for (next = k + 1; next < n && key[next].key == key[k].key;) next++;
-    if (next > k + 2) return REMAP_INCONSISTENT;
+    if (next > k + 2) return tangled(w);
     for (int64_t i = k; i < next; i++) other[key[i].item] = next == k + 2 ? list[key[i == k ? k + 1 : k].item].cell : -1;
   }
   *out = other;
@@ -384,7 +393,7 @@ static remap_status find_beyond(work *w, rm_arena *passing)
   if (mine == REMAP_OK) mine = collect_halves(w, passing, &offset, &list, &face);
   RM_TRY(rm_comm_agree(comm, mine, NULL));
   RM_TRY(rm_comm_exchange(comm, passing, sizeof *list, offset, list, arrives, &halves));
-  RM_TRY(rm_comm_agree(comm, pair_halves(passing, arrives[comm->size], halves, &other), NULL));
+  RM_TRY(rm_comm_agree_reason(comm, pair_halves(w, passing, arrives[comm->size], halves, &other), w->reason));
   RM_TRY(rm_comm_exchange(comm, passing, sizeof *other, arrives, other, returns, &answers));
   return rm_comm_agree(comm, keep_beyond(w, passing, returns[comm->size], face, answers), NULL);
 }
@@ -412,16 +421,16 @@ static remap_status make_room(work *w, rm_arena *passing)
   return REMAP_OK;
 }
 
-remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out)
+remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out, rm_reason *reason)
 {
-  work         w       = {.arena = arena, .job = job, .soup = soup};
+  work         w       = {.arena = arena, .job = job, .soup = soup, .reason = reason};
   rm_arena    *passing = rm_arena_new();
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(job->comm, passing ? make_room(&w, passing) : REMAP_NO_MEMORY, NULL));
   RM_GOTO(done, status = in_passing(&w, do_vertices));
   RM_GOTO(done, status = in_passing(&w, number_faces));
-  RM_GOTO(done, status = rm_comm_agree(job->comm, join_faces(&w, passing), NULL));
+  RM_GOTO(done, status = rm_comm_agree_reason(job->comm, join_faces(&w, passing), reason));
   RM_GOTO(done, status = in_passing(&w, number_cells));
   RM_GOTO(done, status = rm_comm_agree(job->comm, make_cells(&w, passing, out), NULL));
   RM_GOTO(done, status = rm_comm_agree(job->comm, make_faces(&w), NULL));

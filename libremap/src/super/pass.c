@@ -24,11 +24,6 @@ typedef struct work {
   uint8_t            *is_sent[2];   /* [side][caller's faces] it came from whoever made it */
 } work;
 
-static bool passes(const work *w, int side)
-{
-  return w->job->options->pass_through && (w->job->options->keep & (side ? REMAP_IN_TARGET : REMAP_IN_SOURCE));
-}
-
 static remap_status add_cells(work *w)
 {
   for (int side = 0; side < 2; side++) {
@@ -42,7 +37,7 @@ static remap_status add_cells(work *w)
       rm_soup_cell cell = {{-1, -1}, {-1, -1}, {-1, -1}, m->cell_volume[c]};
 
       w->soup_cell[side][c] = -1;
-      if (!passes(w, side) || w->cover->is_met[side][c]) continue;
+      if (!rm_super_passes(w->job, side) || w->cover->is_met[side][c]) continue;
       cell.ancestor[side]   = m->cell_global[c];
       cell.home[side]       = c;
       cell.rank[side]       = w->job->comm->rank;
@@ -61,19 +56,17 @@ static rm_lid cell_behind(const work *w, rm_lid f, int *side)
   const rm_lid *beyond = w->cells->face_beyond[f];
 
   *side = beyond[0] >= 0 ? 0 : 1;
-  if (beyond[*side] < 0 || beyond[1 - *side] >= 0 || !passes(w, *side)) return -1;
+  if (beyond[*side] < 0 || beyond[1 - *side] >= 0 || !rm_super_passes(w->job, *side)) return -1;
   return w->cover->flag[*side][beyond[*side]] & RM_COVER_MET ? -1 : beyond[*side];
 }
 
-/* The caller's face of which triangle t, or one that lies on it, is part for the given cell. */
+/* The caller's face of which triangle t is part for the given cell. */
 static rm_lid face_at_home(const work *w, int side, rm_lid t, rm_lid cell)
 {
   const rm_trimesh *m = w->trimesh[side];
 
-  for (rm_lid k = t; k < m->num_triangles && !memcmp(m->triangle[k], m->triangle[t], sizeof *m->triangle); k++)
-    for (int h = 0; h < 2; h++)
-      if (m->side[k][h] == cell) return w->cover->part.piece[side].face_home[m->triangle_face[k][h]];
-  return -1;
+  const rm_lid f = m->triangle_face[t][m->side[t][0] == cell ? 0 : 1];
+  return f < 0 ? -1 : w->cover->part.piece[side].face_home[f];
 }
 
 typedef struct parcel {
@@ -190,19 +183,18 @@ static remap_status add_faces(work *w, int side)
 static remap_status add_all_faces(work *w)
 {
   for (int side = 0; side < 2; side++)
-    if (passes(w, side)) RM_TRY(add_faces(w, side));
+    if (rm_super_passes(w->job, side)) RM_TRY(add_faces(w, side));
   return REMAP_OK;
 }
 
 remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup)
 {
-  const work w    = {.job = job, .cover = cover};
-  int64_t    passing = 0, faces = 0, corners = 0, nodes = 0;
+  int64_t passing = 0, faces = 0, corners = 0, nodes = 0;
 
   for (int side = 0; side < 2; side++) {
     const rm_mesh *m = job->mesh[side];
 
-    if (!passes(&w, side)) continue;
+    if (!rm_super_passes(job, side)) continue;
     for (rm_lid c = 0; c < m->num_cells; c++) {
       if (cover->is_met[side][c]) continue;
       passing++;

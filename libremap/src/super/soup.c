@@ -128,6 +128,7 @@ static remap_status add_vertices(rm_soup *soup, rm_arena *passing, const rm_trim
   }
   for (rm_lid v = 0; v < cells->num_vertices; v++)
     RM_TRY(add_spot(soup, mesh, corner_of_vertex, &cells->vertex_spot[v], cells->vertex[v]));
+  soup->num_made = soup->num_vertices;
   return REMAP_OK;
 }
 

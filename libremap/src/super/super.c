@@ -1,4 +1,5 @@
-/* super -- the stages in order: cover, triangulation, crossings, cells, cells that pass, numbers. */
+/* super -- the stages in order: cover, triangulation, crossings, cells, cells that pass, numbers. Where what was made does not fit cells
+ * that would pass, which is rare, the first four are done again for all cells. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -20,62 +21,112 @@ static remap_status tell(const work *w, const char *phase, double done)
   return p && p->call && p->call(p->user, phase, done) ? REMAP_CANCELLED : REMAP_OK;
 }
 
-static remap_status cover(work *w, rm_reason *reason)
+/* A zone that lists all cells of the sides that `all` names. Not collective. */
+static remap_status widen_zone(rm_arena *arena, const rm_super_job *job, const bool all[2], const rm_zone **zone)
 {
-  const double   start = rm_seconds();
-  const rm_zone *zone;
+  rm_zone *wide;
 
-  RM_TRY(rm_zone_build(w->passing, w->job->comm, w->job->mesh, &zone));
-  RM_TRY(rm_part_cover(w->passing, w->job->comm, w->job->frame, w->job->mesh, zone, w->job->options->keep, &w->cover, reason));
-  w->figures.seconds_partition = rm_seconds() - start;
+  RM_NEW(wide, arena, 1);
+  *wide = **zone;
+  for (int side = 0; side < 2; side++) {
+    const rm_lid n = job->mesh[side]->num_cells;
+    rm_lid      *cell;
+
+    if (!all[side]) continue;
+    RM_NEW(cell, arena, n);
+    for (rm_lid c = 0; c < n; c++) cell[c] = c;
+    wide->num_cells[side] = n;
+    wide->cell[side]      = cell;
+  }
+  *zone = wide;
+  return REMAP_OK;
+}
+
+static remap_status cover(work *w, const bool all[2], rm_reason *reason)
+{
+  const rm_super_job *job   = w->job;
+  const double        start = rm_seconds();
+  const rm_zone      *zone;
+
+  RM_TRY(rm_zone_build(w->passing, job->comm, job->mesh, &zone));
+  RM_TRY(rm_comm_agree(job->comm, widen_zone(w->passing, job, all, &zone), NULL));
+  RM_TRY(rm_part_cover(w->passing, job->comm, job->frame, job->mesh, zone, job->options->keep, all, &w->cover, reason));
+  w->figures.seconds_partition += rm_seconds() - start;
   return REMAP_OK;
 }
 
 /* What happens on this rank alone. */
-static remap_status make_cells(work *w, rm_reason *reason)
+static remap_status make_cells(work *w, bool *regular, rm_reason *reason)
 {
   const remap_supermesh_options *options = w->job->options;
   const rm_cells_choice choice = {options->keep, w->cover->owner, {w->cover->flag[0], w->cover->flag[1]}, options->aggregate != 0,
                                   options->split_concave != 0};
+  const rm_trimesh     *given[2];
   const rm_overlay     *overlay = NULL;
   double                start   = rm_seconds();
 
   for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &w->mesh[side]));
-    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, w->mesh[side], &w->mesh[side]));
+    RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &given[side]));
+    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, given[side], &w->mesh[side]));
     w->figures.num_triangles[side] = w->mesh[side]->num_triangles;
   }
-  w->figures.seconds_triangulation = rm_seconds() - start;
+  w->figures.seconds_triangulation += rm_seconds() - start;
   RM_TRY(tell(w, "triangulation", 1));
   start = rm_seconds();
   RM_TRY(rm_overlay_build(w->overlay_arena, w->mesh, &w->cover->part, w->job->progress, &overlay, reason));
-  w->figures.seconds_crossings = rm_seconds() - start;
-  w->figures.num_crossings     = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
+  w->figures.seconds_crossings += rm_seconds() - start;
+  w->figures.num_crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
   RM_TRY(rm_cells_build(w->passing, &w->cover->part, overlay, &w->overlay_arena, &choice, &w->cells, reason));
-  w->figures.num_polygons     = w->cells->num_polygons;
-  w->figures.seconds_polygons = w->cells->seconds_polygons;
-  w->figures.seconds_cells    = w->cells->seconds_glue;
-  w->figures.seconds_faces    = w->cells->seconds_faces;
+  w->figures.num_polygons = w->cells->num_polygons;
+  w->figures.seconds_polygons += w->cells->seconds_polygons;
+  w->figures.seconds_cells += w->cells->seconds_glue;
+  w->figures.seconds_faces += w->cells->seconds_faces;
   RM_TRY(tell(w, "cells of the supermesh", 1));
+  return rm_super_is_regular(w->job, w->cover, given, w->mesh, w->cells, regular);
+}
+
+static void drop_passing(work *w)
+{
+  rm_arena_drop(w->overlay_arena);
+  rm_arena_drop(w->passing);
+  w->overlay_arena = w->passing = NULL;
+}
+
+/* The cells of this rank's core; *regular, on all ranks, if others can pass beside them. Collective. */
+static remap_status make_core(work *w, const bool all[2], bool *regular, rm_reason *reason)
+{
+  int64_t irregular;
+
+  drop_passing(w);
+  w->passing       = rm_arena_new();
+  w->overlay_arena = rm_arena_new();
+  RM_TRY(rm_comm_agree(w->job->comm, w->passing && w->overlay_arena ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_TRY(cover(w, all, reason));
+  RM_TRY(rm_comm_agree_reason(w->job->comm, make_cells(w, regular, reason), reason));
+  irregular = !*regular;
+  RM_TRY(rm_comm_max_i64(w->job->comm, &irregular, 1));
+  *regular = !irregular;
+  return REMAP_OK;
+}
+
+static remap_status fill_soup(work *w)
+{
   RM_TRY(rm_super_reserve(w->job, w->cover, w->cells, &w->soup));
   return rm_soup_add_cells(&w->soup, &w->cover->part, w->mesh, w->cells);
 }
 
-/* What the soup has is no longer needed elsewhere. */
-static void drop_passing(work *w)
-{
-  rm_arena_drop(w->passing);
-  w->passing = NULL;
-}
-
 static remap_status build(rm_arena *arena, work *w, rm_super *out, rm_reason *reason)
 {
-  RM_TRY(cover(w, reason));
-  RM_TRY(rm_comm_agree_reason(w->job->comm, make_cells(w, reason), reason));
+  const bool none[2] = {false, false}, all[2] = {rm_super_passes(w->job, 0), rm_super_passes(w->job, 1)};
+  bool       regular = true;
+
+  RM_TRY(make_core(w, none, &regular, reason));
+  if (!regular) RM_TRY(make_core(w, all, &regular, reason));
   const double start = rm_seconds();
+  RM_TRY(rm_comm_agree(w->job->comm, fill_soup(w), NULL));
   RM_TRY(rm_super_pass(w->job, w->cover, w->mesh, w->cells, &w->soup));
   drop_passing(w);
-  RM_TRY(rm_super_finish(arena, w->job, &w->soup, out));
+  RM_TRY(rm_super_finish(arena, w->job, &w->soup, out, reason));
   w->figures.seconds_numbering = rm_seconds() - start;
   return REMAP_OK;
 }
@@ -97,18 +148,17 @@ static void add_figures(const remap_supermesh_view *figures, remap_supermesh_vie
 
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
 {
-  work         w   = {.job = job, .passing = rm_arena_new(), .overlay_arena = rm_arena_new()};
+  work         w   = {.job = job};
   rm_super    *new = rm_arena_zero(arena, 1, sizeof *new);
   remap_status status;
 
-  RM_GOTO(done, status = rm_comm_agree(job->comm, w.passing && w.overlay_arena && new ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(w.passing && w.overlay_arena && new);
+  RM_GOTO(done, status = rm_comm_agree(job->comm, new ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(new);
   RM_GOTO(done, status = build(arena, &w, new, reason));
   add_figures(&w.figures, &new->view);
   *out = new;
 done:
-  rm_arena_drop(w.overlay_arena);
-  rm_arena_drop(w.passing);
+  drop_passing(&w);
   rm_soup_free(&w.soup);
   return status;
 }

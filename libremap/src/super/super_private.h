@@ -1,6 +1,7 @@
 /* super_private -- what the files of the room hand to each other, in the order of the work:
  *
  *   soup.c    what this rank has made, not yet numbered: vertices by what they are made of, faces, cells
+ *   regular.c whether cells can pass as they were given
  *   pass.c    cells that meet nothing of the other mesh, and the faces they share with cells that do
  *   number.c  numbers of equal keys over all ranks
  *   finish.c  the soup numbered and put in order
@@ -37,6 +38,7 @@ typedef struct rm_soup_cell {
 /* malloc'ed; rm_soup_free. Vertices, and faces, of equal coordinates may be there twice. */
 typedef struct rm_soup {
   int64_t         num_corners, num_vertices, num_faces, num_cells, num_loop;
+  int64_t         num_made; /* vertices that room cells made, which come first: distinct ones */
   int64_t         corner_room, vertex_room, face_room, cell_room, loop_room;
   double        (*corner)[3]; /* [num_corners] */
   rm_soup_vertex *vertex;     /* [num_vertices] */
@@ -58,6 +60,17 @@ remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell);
 /* Add what room cells made. Not collective. */
 remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells);
 
+/* True if cells of mesh `side` that meet nothing are part of the result, as they were given. */
+static inline bool rm_super_passes(const rm_super_job *job, int side)
+{
+  return job->options->pass_through && (job->options->keep & (side ? REMAP_IN_TARGET : REMAP_IN_SOURCE));
+}
+
+/* *regular is false if what was made does not fit cells that pass, which then have to be made too. given: the meshes as they were
+ * triangulated; mesh: as they were overlaid. Not collective. */
+remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const given[2],
+                                 const rm_trimesh *const mesh[2], const rm_cells *cells, bool *regular);
+
 /* Room for what rm_super_pass adds, about. Not collective. */
 remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup);
 /* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which are
@@ -70,7 +83,8 @@ remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const
 remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
                              int64_t *total);
 
-/* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. */
-remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out);
+/* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. BAD_MESH if vertices of it that are not
+ * the same lie in one place, or more than two faces. */
+remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out, rm_reason *reason);
 
 #endif

@@ -1,0 +1,55 @@
+/* regular -- can cells that meet nothing stay as they were given? Not where what is made beside them differs from the given faces: where
+ * a face of theirs lies on other faces of its mesh, as cells pinched to no thickness have it, or where triangles without area were
+ * left out, whose vertices the made cells have on their edges. O(n). */
+#include "super/super_private.h"
+
+#include <string.h>
+
+/* True if a cell beside triangle t meets nothing of the other mesh. */
+static bool is_beside_passing(const rm_trimesh *m, const uint8_t *flag, rm_lid t)
+{
+  for (int h = 0; h < 2; h++)
+    if (m->side[t][h] >= 0 && !(flag[m->side[t][h]] & RM_COVER_MET)) return true;
+  return false;
+}
+
+/* Triangles without area touch no cell that passes. */
+static remap_status check_flat(rm_arena *passing, const rm_trimesh *m, const uint8_t *flag, bool *regular)
+{
+  uint8_t *at_flat;
+
+  RM_NEW0(at_flat, passing, m->num_vertices);
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 3 && !rm_has_area(m, t); h++) at_flat[m->triangle[t][h]] = 1;
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 3; h++)
+      if (at_flat[m->triangle[t][h]] && is_beside_passing(m, flag, t)) *regular = false;
+  return REMAP_OK;
+}
+
+/* Faces between made cells and those that pass are of triangles that no other lies on. */
+static void check_stacks(const rm_trimesh *m, const rm_cells *cells, int side, const uint8_t *flag, bool *regular)
+{
+  for (rm_lid f = 0; f < cells->num_faces; f++) {
+    const rm_lid t = cells->face_triangle[f][side], beyond = cells->face_beyond[f][side];
+
+    if (t < 0 || beyond < 0 || (flag[beyond] & RM_COVER_MET)) continue;
+    if (t + 1 < m->num_triangles && !memcmp(m->triangle[t + 1], m->triangle[t], sizeof *m->triangle)) *regular = false;
+  }
+}
+
+remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const given[2],
+                                 const rm_trimesh *const mesh[2], const rm_cells *cells, bool *regular)
+{
+  rm_arena    *passing = rm_arena_new();
+  remap_status status  = passing ? REMAP_OK : REMAP_NO_MEMORY;
+
+  *regular = true;
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
+    if (!rm_super_passes(job, side)) continue;
+    if (given[side] != mesh[side]) status = check_flat(passing, given[side], cover->flag[side], regular);
+    check_stacks(mesh[side], cells, side, cover->flag[side], regular);
+  }
+  rm_arena_drop(passing);
+  return status;
+}
