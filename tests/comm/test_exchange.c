@@ -161,30 +161,73 @@ static void flows_bring_items_and_the_worst_status_of_their_senders(void)
     double         mine[2][50];
 
     RT_EQ(rm_plan_build(&comm, arena, n, rank, item, &plan), REMAP_OK);
-    for (int f = 0; f < 2; f++) RT_EQ(rm_flow_init_chunked(arena, chunk, plan, sizeof *mine[f], &flow[f]), REMAP_OK);
+    for (int f = 0; f < 2; f++) RT_EQ(rm_flow_init_chunked(arena, chunk, plan, f, sizeof *mine[f], &flow[f]), REMAP_OK);
     for (int run = 0; run < 3; run++) {
       const remap_status said    = run == 1 && comm.rank == comm.size - 1 ? REMAP_COVERAGE : REMAP_OK;
-      rm_note            note[2] = {{7, said}, {run == 2 ? (uint64_t)comm.rank : 7, said}};
+      rm_note            note[2] = {{7, (int32_t)said, 0, 0}, {run == 2 ? (uint64_t)comm.rank : 7, (int32_t)said, 0, 0}};
       bool               hears   = false;
       int                others  = 0;
 
       for (int f = 0; f < 2; f++) {
         for (int k = 0; k < 50; k++) mine[f][k] = 1000 * comm.rank + 100 * f + k;
-        RT_EQ(rm_flow_post(&comm, &flow[f], sizeof **mine, mine[f], note[f]), REMAP_OK);
+        RT_EQ(rm_flow_post(&comm, &flow[f], NULL, false, sizeof **mine, mine[f], note[f]), REMAP_OK);
         memset(mine[f], 0, sizeof mine[f]); /* on their way */
       }
       for (int64_t k = 0; k < n; k++) hears |= rank[k] == comm.size - 1, others += rank[k] != comm.rank;
       for (int f = 0; f < 2; f++) {
         const double *got = (const double *)(const void *)flow[f].received;
 
-        RT_EQ(rm_flow_wait(&comm, &flow[f], &note[f]), run == 2 && f == 1 && others ? REMAP_BAD_ARGUMENT : REMAP_OK);
-        for (int64_t k = 0; k < n; k++) RT_NEAR(got[k], 1000 * rank[k] + 100 * f + item[k], 0.0);
+        RT_EQ(rm_flow_wait(&comm, &flow[f], NULL, &note[f]), run == 2 && f == 1 && others ? REMAP_BAD_ARGUMENT : REMAP_OK);
+        for (int64_t k = 0; k < n; k++) RT_NEAR(got[k], run == 2 && f == 1 && rank[k] != comm.rank ? 0.0 : 1000 * rank[k] + 100 * f + item[k], 0.0);
         RT_EQ(note[f].status, run == 1 && hears ? REMAP_COVERAGE : said);
       }
     }
     rm_arena_drop(arena);
   }
   rm_comm_free(&comm);
+}
+
+/* The last rank says something else, and sends items of another size: it and its peers are apart from each other, nobody else is,
+ * and all of it is forgotten in the next run. */
+static void who_says_something_else_is_apart_from_its_peers(void)
+{
+  for (int64_t chunk = 30; chunk <= 1 << 20; chunk *= 1 << 15) {
+    rm_comm         comm  = world();
+    rm_arena       *arena = rm_arena_new();
+    int            *rank  = rm_arena_alloc(arena, comm.size * 300, sizeof *rank);
+    rm_lid         *item  = rm_arena_alloc(arena, comm.size * 300, sizeof *item);
+    const int64_t   n     = wants(&comm, 2, 300, rank, item);
+    const bool      is_last = comm.rank == comm.size - 1;
+    const rm_plan  *plan  = NULL;
+    const rm_peers *peers = NULL;
+    rm_parley       parley;
+    rm_flow         flow;
+    double          mine[300][2];
+
+    RT_EQ(rm_plan_build(&comm, arena, n, rank, item, &plan), REMAP_OK);
+    RT_EQ(rm_peers_build(arena, &comm, 1, &plan, &peers), REMAP_OK);
+    RT_EQ(rm_parley_init(arena, peers, &parley), REMAP_OK);
+    RT_EQ(rm_flow_init_chunked(arena, chunk, plan, 0, sizeof *mine, &flow), REMAP_OK);
+    for (int run = 0; run < 6; run++) {
+      const bool   differs = run % 2 == 0, is_odd = is_last && differs;
+      const size_t size    = is_odd == (run % 4 == 0) ? sizeof **mine : sizeof *mine; /* longer or shorter than the others' */
+      rm_note      note    = {is_odd ? 11 : 12, REMAP_OK, 0, 0};
+      bool         all     = true, meets_odd = false;
+
+      for (int k = 0; k < 300; k++) mine[k][0] = mine[k][1] = 1000 * comm.rank + k;
+      RT_EQ(rm_flow_post(&comm, &flow, &parley, true, size, mine, note), REMAP_OK);
+      const remap_status status = rm_flow_wait(&comm, &flow, &parley, &note);
+      for (int p = 0; p < peers->num; p++) {
+        RT_EQ(parley.is_apart[p], differs && (is_last || peers->rank[p] == comm.size - 1));
+        meets_odd |= differs && (is_last || peers->rank[p] == comm.size - 1);
+      }
+      RT_EQ(status, meets_odd ? REMAP_BAD_ARGUMENT : REMAP_OK);
+      RT_EQ(rm_parley_all(&comm, &parley, &all), REMAP_OK);
+      RT_CHECK(all == (!differs || comm.size == 1));
+    }
+    rm_arena_drop(arena);
+    rm_comm_free(&comm);
+  }
 }
 
 static void only_neighbours_take_part_in_a_plan(void)
@@ -236,5 +279,6 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
         RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
         RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
-        RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders), RT_CASE(only_neighbours_take_part_in_a_plan),
+        RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders), RT_CASE(who_says_something_else_is_apart_from_its_peers),
+        RT_CASE(only_neighbours_take_part_in_a_plan),
         RT_CASE(a_rank_without_memory_stops_a_plan_everywhere))

@@ -20,6 +20,9 @@
  * Conventions that hold for every function below:
  *   - a collective function is called by every rank of the context's communicator and returns the
  *     same status on each of them;
+ *   - ranks that call different functions of a context, or differ in what they must agree on, do not wait
+ *     for each other: those that notice return REMAP_BAD_ARGUMENT, and the next call that all make alike
+ *     is not affected (not so for remap_create and remap_destroy);
  *   - ranks without cells are welcome: their counts are 0 and their arrays may be NULL;
  *   - outputs are written only when REMAP_OK is returned;
  *   - lengths are in the caller's unit, volumes in that unit cubed;
@@ -424,9 +427,9 @@ REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *ma
  *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields, a
  *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS or a system,
  *  and one with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
- *  exchanges messages with neighbours only and takes no memory: its status is the worst of this rank's own and of those
- *  neighbours' whose values it uses, and may differ from rank to rank; remap_agree makes it one. Values below 1e-280 count
- *  as 0.
+ *  exchanges messages with neighbours only (and notes with three ranks at most that need not be) and takes no memory: its
+ *  status is the worst of this rank's own and of those neighbours' whose values it uses, and may differ from rank to rank;
+ *  remap_agree makes it one. transfer NULL means the defaults. Values below 1e-280 count as 0.
  *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value, a density in a system that is not
  *  positive), COVERAGE, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
@@ -436,8 +439,9 @@ REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction
  *  and sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes.
  *  fields and transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change.
  *  One transfer in each direction and context may be under way; all ranks start and finish them in the same order, and none
- *  builds, moves or masks in between. A start that fails does so on all ranks alike and leaves nothing under way; what is
- *  wrong with this rank's own values is told by the finish.
+ *  builds, moves or masks in between, or calls remap_field where others call the halves. A start that fails leaves nothing under
+ *  way on this rank; others, whose arguments are sound, hear of it in the finish. What is wrong with this rank's own values is told
+ *  by the finish. In halves, each rank also exchanges a note with three ranks at most about reports, which agree as in remap_field.
  *  Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
 REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
                                          int num_fields, const remap_field_desc *fields);
@@ -451,7 +455,7 @@ REMAP_API remap_status remap_agree(remap_context *ctx, remap_status mine);
 REMAP_API const char *remap_message(const remap_context *ctx);
 
 /** Statistics of the last remap_build. Not collective. Errors: BAD_ORDER. */
-REMAP_API remap_status remap_get_stats(const remap_context *ctx, remap_stats *out);
+REMAP_API remap_status remap_get_stats(remap_context *ctx, remap_stats *out);
 
 /** The pairs, as rows of the receiving mesh. Not collective. *out is a view owned by the context, made at the first call.
  *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY. */
@@ -460,12 +464,12 @@ REMAP_API remap_status remap_pairs(remap_context *ctx, remap_direction direction
 /** How much of each cell of one side is covered by cells of the other mesh that give. Not collective. fraction and cover,
  *  [cells of that side on this rank], are the caller's; either may be NULL.
  *  Errors: BAD_ORDER. */
-REMAP_API remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover);
+REMAP_API remap_status remap_coverage(remap_context *ctx, remap_side side, double *fraction, remap_cover *cover);
 
 /** The cells of one side on this rank that want values and get none, because nothing that gives covers any of them,
  *  ascending. Not collective. num receives their number; cell [*num] is the caller's and may be NULL.
  *  Errors: BAD_ORDER, BAD_ARGUMENT. */
-REMAP_API remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
+REMAP_API remap_status remap_uncovered(remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
 
 /** The cells of one side, over all ranks, that are covered in part and least of all: ascending by fraction. Collective; the
  *  same on every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in it. Masks
@@ -475,7 +479,7 @@ REMAP_API remap_status remap_partial_cells(remap_context *ctx, remap_side side, 
 
 /** Volumes (signed: negative for an inverted cell) and centroids of the cells of one side. Not collective. volume [cells]
  *  and centroid [cells][3] are the caller's; either may be NULL. Errors: BAD_ORDER. */
-REMAP_API remap_status remap_cells(const remap_context *ctx, remap_side side, double *volume, double *centroid);
+REMAP_API remap_status remap_cells(remap_context *ctx, remap_side side, double *volume, double *centroid);
 
 /** Set every member to its default. Not collective. */
 REMAP_API void remap_supermesh_options_default(remap_supermesh_options *options);

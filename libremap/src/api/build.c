@@ -138,6 +138,7 @@ static remap_status build_anew(remap_context *ctx, const bool moves[2], bool kee
   ctx->mapping = NULL;
   rm_context_drop_masks(ctx);
   rm_context_drop_super(ctx);
+  ctx->parley = ctx->few;
   rm_arena_drop(ctx->arena);
   ctx->arena    = rm_arena_new();
   ctx->is_built = false;
@@ -162,7 +163,7 @@ remap_status remap_build(remap_context *ctx)
   ctx->message[0] = '\0';
   if (rm_context_is_busy(ctx))
     status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
-  status = stage(ctx, status, &reason);
+  status = rm_context_start_call(ctx, RM_CALL_BUILD, status, &reason);
   if (status == REMAP_OK) {
     for (int side = 0; side < 2; side++) ctx->is_turned[side] = false;
     rm_context_drop_place(ctx);
@@ -196,7 +197,7 @@ remap_status remap_move(remap_context *ctx, const remap_motion motion[2])
     status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "a transfer is under way: remap_field_finish comes first");
   else if (!motion)
     status = rm_fail(REMAP_BAD_ARGUMENT, &reason, -1, -1, "motion is NULL");
-  status = rm_comm_agree_reason(&ctx->comm, status, &reason);
+  status = rm_context_start_call(ctx, RM_CALL_MOVE, status, &reason);
   if (status == REMAP_OK) {
     int64_t any[2];
 

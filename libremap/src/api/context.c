@@ -75,23 +75,29 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
     int64_t unused[8] = {0};
     (void)rm_comm_max_i64(&own, unused, 8);
   }
+  if (ctx) ctx->comm = own;
+  if (status == REMAP_OK) status = rm_context_meet_few(ctx);
   status = rm_comm_agree(&own, status, NULL);
   if (status != REMAP_OK) {
+    rm_arena_drop(ctx ? ctx->peers_arena : NULL);
     rm_comm_free(&own);
     free(ctx);
     return status;
   }
   RM_ASSERT(ctx); /* agreed, so true on every rank */
-  ctx->comm = own;
-  *out      = ctx;
+  *out = ctx;
   return REMAP_OK;
 }
 
 remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_blocks, const remap_mesh *block)
 {
-  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(num_blocks >= 0 && (block || num_blocks == 0), REMAP_BAD_ARGUMENT);
-  RM_TRY(rm_grow(&ctx->block[side], &ctx->block_room[side], num_blocks, sizeof *block));
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  if (side != REMAP_SOURCE && side != REMAP_TARGET)
+    return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "side is %d, neither source nor target", (int)side);
+  if (num_blocks < 0 || (!block && num_blocks > 0))
+    return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "num_blocks is %d, block is %s", num_blocks, block ? "given" : "NULL");
+  if (rm_grow(&ctx->block[side], &ctx->block_room[side], num_blocks, sizeof *block) != REMAP_OK)
+    return rm_context_fail(ctx, REMAP_NO_MEMORY, "no memory for %d blocks", num_blocks);
   for (int b = 0; b < num_blocks; b++) ctx->block[side][b] = block[b];
   ctx->num_blocks[side] = num_blocks;
   ctx->is_set[side]     = true;
@@ -102,14 +108,21 @@ remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_block
 
 remap_status remap_set_mesh(remap_context *ctx, remap_side side, const remap_mesh *mesh)
 {
-  RM_REQUIRE(mesh, REMAP_BAD_ARGUMENT);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  if (!mesh) return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "mesh is NULL");
   return remap_set_blocks(ctx, side, 1, mesh);
 }
 
 remap_status remap_agree(remap_context *ctx, remap_status mine)
 {
+  rm_reason reason = {-1, -1, ""};
+
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
-  return rm_comm_agree(&ctx->comm, mine, NULL);
+  const remap_status entered = rm_context_enter(ctx, RM_CALL_AGREE, 0, &reason);
+
+  if (entered == REMAP_OK) return rm_comm_agree(&ctx->comm, mine, NULL);
+  rm_context_explain(ctx, entered, &reason);
+  return entered > mine ? entered : mine;
 }
 
 const char *remap_message(const remap_context *ctx) { return ctx ? ctx->message : ""; }
@@ -123,6 +136,7 @@ void remap_destroy(remap_context **ctx)
   rm_context_drop_super(*ctx);
   rm_context_drop_meshes(*ctx);
   rm_arena_drop((*ctx)->arena);
+  rm_arena_drop((*ctx)->peers_arena);
   for (int side = 0; side < 2; side++) free((*ctx)->block[side]);
   rm_comm_free(&(*ctx)->comm);
   free(*ctx);

@@ -27,8 +27,16 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
+/* Calls that all ranks make together, or among neighbours. */
+typedef enum rm_call {
+  RM_CALL_BUILD = 1, RM_CALL_MOVE, RM_CALL_MASKS, RM_CALL_AGREE, RM_CALL_PARTIAL_CELLS, RM_CALL_SUPERMESH, RM_CALL_FIRST_TRANSFER,
+  RM_CALL_LARGER_TRANSFER, RM_CALL_REFUSED_TRANSFER, RM_CALL_FINISH
+} rm_call;
+
 struct remap_context {
   rm_comm       comm;
+  rm_arena     *peers_arena;
+  rm_parley     few, parley; /* that calls begin with; few: of ranks in the tree only, parley: of neighbours too */
   remap_options options;
   remap_mesh   *block[2]; /* [side][num_blocks] as lent; malloc'ed */
   int64_t       block_room[2];
@@ -72,6 +80,29 @@ struct remap_context {
   rm_arena         *super_arena; /* of the last supermesh alone */
   const rm_super   *super;       /* NULL: none                  */
 };
+
+/* Put a text into the context's message, and hand status back. Not collective. */
+remap_status rm_context_fail(remap_context *ctx, remap_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* What calls that only look at an overlay begin with. Not collective. BAD_ARGUMENT, BAD_ORDER. */
+remap_status rm_context_check_view(remap_context *ctx, bool is_good, const char *function);
+
+/* The mark of a call that must agree on a detail. */
+uint64_t rm_context_mark(rm_call call, int detail);
+
+/* What a collective call begins with. BAD_ARGUMENT unless every rank makes the same one with the same detail; nobody waits for a
+ * rank that makes another. */
+remap_status rm_context_enter(remap_context *ctx, rm_call call, int detail, rm_reason *reason);
+
+/* The same, and then one status for all, as rm_comm_agree_reason. */
+remap_status rm_context_start_call(remap_context *ctx, rm_call call, remap_status mine, rm_reason *reason);
+
+/* Find out whom calls begin with before there are transfers. Not collective; on all ranks. NO_MEMORY. */
+remap_status rm_context_meet_few(remap_context *ctx);
+
+/* The same once carriers are made. Collective. NO_MEMORY: everything stays as it is. */
+remap_status rm_context_meet(remap_context *ctx);
 
 /* Put what *reason says about a failure into the context's message, with mesh, zone and cell by name. Not collective. */
 void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason);

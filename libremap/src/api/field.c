@@ -67,16 +67,20 @@ static remap_status check_own(const remap_context *ctx, remap_direction directio
   return REMAP_OK;
 }
 
+/* Does a transfer end in reports? Of one in two halves that is not known at the start. */
+typedef enum reporting { WITHOUT_REPORTS, WITH_REPORTS, IN_HALVES } reporting;
+
 /* A number that tells this transfer from others that ranks might mistake for it. */
-static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields)
+static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields,
+                        reporting reports)
 {
-  const int    words[8] = {(int)direction,       how->order, (int)how->limiter,   (int)how->on_uncovered,
-                           (int)how->on_partial, num_fields, how->allow_nan != 0, how->rotation != NULL};
+  const int    words[9] = {(int)direction,       how->order, (int)how->limiter,   (int)how->on_uncovered,   (int)how->on_partial,
+                           num_fields, how->allow_nan != 0, how->rotation != NULL, (int)reports};
   const double gas[2]   = {how->gamma, how->gas_constant};
   uint64_t     hash     = 0, bits[2];
 
   memcpy(bits, gas, sizeof bits);
-  for (int k = 0; k < 8; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
+  for (int k = 0; k < 9; k++) hash = rm_hash_word(hash ^ (uint64_t)words[k]);
   for (int k = 0; k < 2; k++) hash = rm_hash_word(hash ^ bits[k]);
   for (int k = 0; k < num_fields; k++) {
     const remap_field_desc *f = &fields[k];
@@ -194,68 +198,87 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
   if (load.is_wide && load.is_blended) RM_TRY(need_wide(ctx, 1 - giving, false));
   const rm_transfer_setup setup = setup_of(ctx, direction, load.is_wide);
   RM_TRY(rm_carrier_build(ctx->carrier_arena[direction], &setup, load, &ctx->carrier[direction], reason));
-  ctx->load[direction] = load;
-  return REMAP_OK;
-}
-
-/* The first transfer in a direction is collective: ranks that pass sound arguments wait for the others' word. */
-static bool is_first(const remap_context *ctx, remap_direction direction)
-{
-  return (direction == REMAP_FORWARD || direction == REMAP_BACKWARD) && !ctx->carrier[direction];
-}
-
-static remap_status start(remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
-                          const remap_field_desc *fields, rm_reason *reason)
-{
-  remap_status mine = check_agreed(ctx, direction, how, num_fields, fields, reason);
-
-  if (mine == REMAP_BAD_ARGUMENT && is_first(ctx, direction)) return rm_comm_agree_reason(&ctx->comm, mine, reason);
-  RM_TRY(mine);
-  const rm_transfer_setup setup = setup_of(ctx, direction, false);
-  const rm_load           load  = rm_load_of(&setup, how, num_fields, fields);
-  const uint64_t          mark  = mark_of(direction, how, num_fields, fields);
-  mine                          = check_own(ctx, direction, num_fields, fields, reason);
-  if (!ctx->carrier[direction] || !rm_load_covers(ctx->load[direction], load)) {
-    RM_TRY(rm_comm_agree_reason(&ctx->comm, mine, reason));
-    RM_TRY(check_marks(ctx, mark, reason));
-    RM_TRY(prepare(ctx, direction, load, reason));
-  }
-  rm_carrier_start(ctx->carrier[direction], how, num_fields, fields, mark, mine, reason);
-  return REMAP_OK;
-}
-
-remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
-                               const remap_field_desc *fields)
-{
-  rm_reason      reason = {-1, -1, ""};
-  remap_transfer how;
-  remap_status   status;
-  const double   begin = rm_seconds();
-
-  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
-  ctx->message[0] = '\0';
-  remap_transfer_default(&how);
-  if (transfer) how = *transfer;
-  status = start(ctx, direction, &how, num_fields, fields, &reason);
-  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
-  ctx->seconds_transfer += rm_seconds() - begin;
+  ctx->load[direction]      = load;
+  const remap_status status = rm_context_meet(ctx);
+  if (status != REMAP_OK) ctx->carrier[direction] = NULL;
   return status;
 }
 
-remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports)
+/* Transfers that need more than is there prepare it together. Collective; mine is the status of what only this rank passes. */
+static remap_status prepare_together(remap_context *ctx, remap_direction direction, rm_load load, uint64_t mark, remap_status mine,
+                                     rm_reason *reason)
+{
+  if (ctx->carrier[direction]) RM_TRY(rm_context_enter(ctx, RM_CALL_LARGER_TRANSFER, (int)direction, reason));
+  RM_TRY(rm_comm_agree_reason(&ctx->comm, mine, reason));
+  RM_TRY(check_marks(ctx, mark, reason));
+  return prepare(ctx, direction, load, reason);
+}
+
+/* Arguments that every rank must pass alike are wrong here, or come at the wrong time. The first transfer in a direction is
+ * collective: then all ranks hear what is wrong; later, those that wait for this one find out that it does not come along. */
+static remap_status start_alike(remap_context *ctx, remap_direction direction, const remap_transfer *how, int num_fields,
+                                const remap_field_desc *fields, rm_reason *reason)
+{
+  const remap_status mine     = check_agreed(ctx, direction, how, num_fields, fields, reason);
+  const bool         is_known = direction == REMAP_FORWARD || direction == REMAP_BACKWARD;
+
+  if (is_known && !ctx->carrier[direction]) {
+    RM_TRY(rm_context_enter(ctx, RM_CALL_FIRST_TRANSFER, (int)direction, reason));
+    return mine == REMAP_OK ? mine : rm_comm_agree_reason(&ctx->comm, mine, reason);
+  }
+  if (mine != REMAP_OK && !(is_known && rm_carrier_is_under_way(ctx->carrier[direction])))
+    (void)rm_parley_hold(&ctx->comm, &ctx->parley, rm_context_mark(RM_CALL_REFUSED_TRANSFER, 0));
+  return mine;
+}
+
+static remap_status start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                          const remap_field_desc *fields, reporting reports, rm_reason *reason)
+{
+  remap_transfer how;
+  remap_status   mine;
+
+  remap_transfer_default(&how);
+  if (transfer) how = *transfer;
+  RM_TRY(start_alike(ctx, direction, &how, num_fields, fields, reason));
+  const rm_transfer_setup setup = setup_of(ctx, direction, false);
+  const rm_load           load  = rm_load_of(&setup, &how, num_fields, fields);
+  const uint64_t          mark  = mark_of(direction, &how, num_fields, fields, reports);
+  mine = check_own(ctx, direction, num_fields, fields, reason);
+  if (!ctx->carrier[direction] || !rm_load_covers(ctx->load[direction], load))
+    RM_TRY(prepare_together(ctx, direction, load, mark, mine, reason));
+  rm_carrier_start(ctx->carrier[direction], &how, num_fields, fields, mark, mine, reason);
+  return REMAP_OK;
+}
+
+/* The first half, timed and explained. */
+static remap_status start_timed(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                                const remap_field_desc *fields, reporting reports)
 {
   rm_reason    reason = {-1, -1, ""};
   remap_status status;
   const double begin = rm_seconds();
 
-  RM_REQUIRE(ctx && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
+  ctx->message[0] = '\0';
+  status          = start(ctx, direction, transfer, num_fields, fields, reports, &reason);
+  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
+  ctx->seconds_transfer += rm_seconds() - begin;
+  return status;
+}
+
+/* The second half, timed and explained. */
+static remap_status finish_timed(remap_context *ctx, remap_direction direction, remap_field_report *reports, bool in_halves)
+{
+  rm_reason    reason = {-1, -1, ""};
+  remap_status status;
+  const double begin = rm_seconds(), unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
+
   ctx->message[0] = '\0';
   if (!rm_carrier_is_under_way(ctx->carrier[direction])) {
     status =
         rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, "no transfer in this direction is under way: remap_field_start comes first");
   } else {
-    const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
-
+    if (in_halves)
+      rm_carrier_confirm(ctx->carrier[direction], rm_context_mark(RM_CALL_FINISH, 2 * (int)direction + (reports != NULL)));
     status = rm_carrier_finish(ctx->carrier[direction], cubed, reports, &reason);
   }
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
@@ -263,11 +286,27 @@ remap_status remap_field_finish(remap_context *ctx, remap_direction direction, r
   return status;
 }
 
+remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
+                               const remap_field_desc *fields)
+{
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  return start_timed(ctx, direction, transfer, num_fields, fields, IN_HALVES);
+}
+
+remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports)
+{
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  if (direction != REMAP_FORWARD && direction != REMAP_BACKWARD)
+    return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "direction is %d, neither forward nor backward", (int)direction);
+  return finish_timed(ctx, direction, reports, true);
+}
+
 remap_status remap_field(remap_context *ctx, remap_direction direction, const remap_transfer *transfer, int num_fields,
                          const remap_field_desc *fields, remap_field_report *reports)
 {
-  RM_TRY(remap_field_start(ctx, direction, transfer, num_fields, fields));
-  return remap_field_finish(ctx, direction, reports);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(start_timed(ctx, direction, transfer, num_fields, fields, reports ? WITH_REPORTS : WITHOUT_REPORTS));
+  return finish_timed(ctx, direction, reports, false);
 }
 
 bool rm_context_is_busy(const remap_context *ctx)

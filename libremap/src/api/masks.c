@@ -113,14 +113,15 @@ static remap_status apply(remap_context *ctx, const remap_masks *masks, rm_reaso
 remap_status remap_set_masks(remap_context *ctx, const remap_masks *masks)
 {
   rm_reason    reason = {-1, -1, ""};
-  remap_status status;
+  remap_status status = REMAP_OK;
 
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   ctx->message[0] = '\0';
-  if (!ctx->is_built || rm_context_is_busy(ctx)) {
+  if (!ctx->is_built || rm_context_is_busy(ctx))
     status = rm_fail(REMAP_BAD_ORDER, &reason, -1, -1, ctx->is_built ? "a transfer is under way: remap_field_finish comes first"
                                                                      : "masks need a successful remap_build");
-  } else {
+  status = rm_context_start_call(ctx, RM_CALL_MASKS, status, &reason);
+  if (status == REMAP_OK) {
     rm_context_drop_carriers(ctx);
     rm_context_drop_masks(ctx);
     status = apply(ctx, masks, &reason);

@@ -69,7 +69,7 @@ remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *
   rm_context_drop_super(ctx);
   ctx->super_arena = rm_arena_new();
   passing          = rm_arena_new();
-  status           = rm_comm_agree(&ctx->comm, ctx->super_arena && passing ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+  status = rm_context_start_call(ctx, RM_CALL_SUPERMESH, ctx->super_arena && passing ? REMAP_OK : REMAP_NO_MEMORY, &reason);
   if (status == REMAP_OK) status = supermesh(ctx, &chosen, out != NULL, passing, &reason);
   rm_arena_drop(passing);
   if (status != REMAP_OK) {

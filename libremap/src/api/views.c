@@ -10,19 +10,21 @@ static const rm_rows *rows_of(const remap_context *ctx, remap_side side)
   return &ctx->masked[side == REMAP_TARGET ? REMAP_FORWARD : REMAP_BACKWARD]->rows[side];
 }
 
-remap_status remap_get_stats(const remap_context *ctx, remap_stats *out)
+static bool is_side(remap_side side) { return side == REMAP_SOURCE || side == REMAP_TARGET; }
+
+remap_status remap_get_stats(remap_context *ctx, remap_stats *out)
 {
-  RM_REQUIRE(ctx && out, REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_context_check_view(ctx, out != NULL, "remap_get_stats"));
   *out                  = ctx->stats;
   out->seconds_transfer = ctx->seconds_transfer;
   return REMAP_OK;
 }
 
-remap_status remap_cells(const remap_context *ctx, remap_side side, double *volume, double *centroid)
+remap_status remap_cells(remap_context *ctx, remap_side side, double *volume, double *centroid)
 {
-  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_context_check_view(ctx, is_side(side), "remap_cells"));
   const rm_mesh *m = ctx->mesh[side];
   const double   unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
 
@@ -42,10 +44,10 @@ static double fraction_of(const remap_context *ctx, remap_side side, const rm_ro
   return rows->cover[cell] == REMAP_COVERED ? 1 : fabs(own) > 0 ? rm_row_volume(rows, cell) / own : 0;
 }
 
-remap_status remap_coverage(const remap_context *ctx, remap_side side, double *fraction, remap_cover *cover)
+remap_status remap_coverage(remap_context *ctx, remap_side side, double *fraction, remap_cover *cover)
 {
-  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_context_check_view(ctx, is_side(side), "remap_coverage"));
   const rm_rows *rows = rows_of(ctx, side);
 
   for (rm_lid c = 0; c < rows->num_cells; c++) {
@@ -55,10 +57,10 @@ remap_status remap_coverage(const remap_context *ctx, remap_side side, double *f
   return REMAP_OK;
 }
 
-remap_status remap_uncovered(const remap_context *ctx, remap_side side, int64_t *num, int64_t *cell)
+remap_status remap_uncovered(remap_context *ctx, remap_side side, int64_t *num, int64_t *cell)
 {
-  RM_REQUIRE(ctx && num && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_context_check_view(ctx, num && is_side(side), "remap_uncovered"));
   const rm_rows *rows = rows_of(ctx, side);
   int64_t        n    = 0;
 
@@ -126,24 +128,29 @@ static remap_status gather_partial(rm_arena *scratch, const remap_context *ctx, 
 
 remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, remap_partial_cell *cell)
 {
-  RM_REQUIRE(ctx && (side == REMAP_SOURCE || side == REMAP_TARGET), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  rm_reason    reason  = {-1, -1, ""};
   rm_arena    *scratch = rm_arena_new();
   int64_t      room[2] = {num ? *num : -1, num ? -*num : 1};
-  remap_status status  = !scratch ? REMAP_NO_MEMORY : room[0] < 0 || (room[0] > 0 && !cell) ? REMAP_BAD_ARGUMENT : REMAP_OK;
+  remap_status status  = rm_context_check_view(ctx, is_side(side) && room[0] >= 0 && (room[0] == 0 || cell), "remap_partial_cells");
 
-  RM_GOTO(done, status = rm_comm_agree(&ctx->comm, status, NULL));
+  if (status != REMAP_OK) rm_fail(status, &reason, -1, -1, "%s", ctx->message);
+  if (!scratch) status = REMAP_NO_MEMORY;
+  RM_GOTO(done, status = rm_context_start_call(ctx, RM_CALL_PARTIAL_CELLS, status, &reason));
   RM_GOTO(done, status = rm_comm_max_i64(&ctx->comm, room, 2));
-  status = room[0] == -room[1] ? gather_partial(scratch, ctx, side, (int)room[0], num, cell) : REMAP_BAD_ARGUMENT;
+  status = room[0] == -room[1]
+             ? gather_partial(scratch, ctx, side, (int)room[0], num, cell)
+             : rm_fail(REMAP_BAD_ARGUMENT, &reason, -1, -1, "remap_partial_cells: *num differs between ranks");
 done:
   rm_arena_drop(scratch);
+  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;
 }
 
 remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out)
 {
-  RM_REQUIRE(ctx && out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), REMAP_BAD_ARGUMENT);
-  RM_REQUIRE(ctx->is_built, REMAP_BAD_ORDER);
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  RM_TRY(rm_context_check_view(ctx, out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), "remap_pairs"));
   const rm_rows    *rows = rows_of(ctx, direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE);
   rm_arena         *arena = ctx->mask_arena ? ctx->mask_arena : ctx->arena;
   const double      unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;

@@ -55,34 +55,75 @@ remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_wan
  * send_offset[num_send] items. Among neighbours only: returns as soon as this rank has sent and received. */
 remap_status rm_plan_run(const rm_comm *comm, const rm_plan *plan, size_t size, const void *item, void *received, void *buffer);
 
-/* What a rank tells its neighbours in front of its items. */
+/* What a rank tells another before, or in front of, the items that it sends. */
 typedef struct rm_note {
   uint64_t mark;   /* says what is under way: the same at sender and receiver, if they agree */
-  int64_t  status; /* remap_status of the sender                                             */
+  int32_t  status; /* remap_status of the sender                                             */
+  int32_t  tag;    /* set by the room: of messages that follow this one                      */
+  int64_t  more;   /* likewise: how many follow                                              */
 } rm_note;
+
+/* peers -- ranks whose calls meet: one's parent and children in a binary tree over all ranks, and those that messages come from
+ * or go to. Being a peer is mutual. Read-only once built. */
+typedef struct rm_peers {
+  int        num;
+  const int *rank; /* [num] ascending, without this rank */
+} rm_peers;
+/* The tree, and the neighbours of num_plans plans, which may be NULL. Not collective, but mutual if all ranks call it for the same
+ * plans. Lives in arena. NO_MEMORY. */
+remap_status rm_peers_build(rm_arena *arena, const rm_comm *comm, int num_plans, const rm_plan *const *plan,
+                            const rm_peers **out);
+
+/* parley -- before ranks go on together each tells its peers by a mark what it is about to do, and goes on only with those of the
+ * same mark; the others are apart from it, as it is from them. So a call that differs between ranks is noticed at both ends, and
+ * nobody waits for one that does something else. Its memory is taken once. */
+typedef struct rm_parley {
+  const rm_peers *peers;
+  uint8_t        *is_apart;  /* [num] 1: said something else when the parley was last held */
+  rm_note         said;
+  char          (*heard)[1024]; /* [num] first messages                                    */
+  MPI_Request    *request;   /* [2 num] of notes that come and go alone                      */
+  bool            is_open;   /* notes are under way                                         */
+} rm_parley;
+/* Not collective. Lives in arena. NO_MEMORY. */
+remap_status rm_parley_init(rm_arena *arena, const rm_peers *peers, rm_parley *out);
+/* Tell all peers and hear them. By all ranks; waits for peers only. BAD_ARGUMENT if one is apart. */
+remap_status rm_parley_hold(const rm_comm *comm, rm_parley *parley, uint64_t mark);
+/* Tell those of the tree that are not apart how to go on, and hear them. By all ranks that go on; waits for these only. BAD_ARGUMENT
+ * if one is apart from now on. */
+remap_status rm_parley_confirm(const rm_comm *comm, rm_parley *parley, uint64_t mark);
+/* Does everybody agree? By all ranks of one mark after a parley: *all is true on every rank of the communicator or on none of those
+ * that call this; true if nobody is apart from anybody. */
+remap_status rm_parley_all(const rm_comm *comm, const rm_parley *parley, bool *all);
 
 /* flow -- a plan run in two steps, so that other work fits between, with a note in front of every message. Its memory is taken
  * once. rm_flow_post and rm_flow_wait involve neighbours only and take turns; a rank that failed posts all the same and says so
- * in its note, so nobody waits for ever. */
+ * in its note, so nobody waits for ever. The first run of several opens a parley: it carries the notes, and those who are no
+ * neighbours get one alone. The others leave out who is apart. */
 typedef struct rm_flow {
   const rm_plan *plan;
+  int            stream;   /* flows that are under way at once have different ones                         */
   size_t         most;     /* bytes per item that there is room for                                        */
   size_t         size;     /* bytes per item of the run under way                                          */
   int64_t        chunk;    /* bytes of one message to MPI at most                                          */
   char          *sent;     /* messages to others side by side, each a note and items                       */
-  char          *arrived;  /* messages from others likewise                                                */
+  char         (*arrived)[1024]; /* [num_recv] first messages from others                                  */
   char          *received; /* [plan->recv_offset[plan->num_recv]] items of the last run, in the plan's order */
-  MPI_Request   *request;
-  MPI_Status    *status;       /* of the requests */
-  int            num_requests; /* under way       */
+  MPI_Request   *first;    /* [num_recv] of first messages from others                                     */
+  MPI_Request   *request;  /* of what follows those, [rest[i]] on from neighbour i, and of all that is sent */
+  int           *rest;     /* [num_recv]                                                                   */
+  int            num_requests; /* under way        */
+  bool           is_under_way;
 } rm_flow;
 
 /* Room for runs of at most `most` bytes per item. Not collective. Lives in arena. NO_MEMORY. */
-remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_flow *out);
-/* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards. */
-remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const void *item, rm_note note);
+remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size_t most, rm_flow *out);
+/* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards. parley
+ * may be NULL: then everybody is there. */
+remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,
+                          rm_note note);
 /* Wait until this rank has received and sent; flow->received then holds the items. The status in note becomes the greatest of its
- * own and the senders'. BAD_ARGUMENT if a sender's mark or size differs. */
-remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_note *note);
+ * own and the senders'. BAD_ARGUMENT if somebody turned out to be apart, or sends another number of items; items of such are 0. */
+remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_parley *parley, rm_note *note);
 
 #endif

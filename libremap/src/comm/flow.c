@@ -1,46 +1,53 @@
-/* flow -- an exchange among neighbours in two steps. All chunks of all messages are posted at once; what a rank wants from
- * itself is copied. O(data) time; memory for what is sent, what arrives, and the items in the plan's order. */
+/* flow -- an exchange among neighbours in two steps. Everything is posted at once, what is sent and what is expected: a first message
+ * per neighbour with a note, and the items if they are few; else the items by themselves. A neighbour that has another run in mind
+ * is known by its note: then what was expected of it is called off, and what it sent taken away. What a rank wants from itself is
+ * copied. O(data) time; memory for what is sent, the first messages, and the items in the plan's order. */
 #include "comm/comm_private.h"
 
 #include <string.h>
 
-enum { TAG_FLOW = 3 };
+enum { NOTE = sizeof(rm_note) };
 
-/* Chunks of a message of `items` items of at most `size` bytes. */
-static int64_t num_chunks(int64_t items, size_t size, int64_t chunk)
+/* Messages that follow a first one of so many bytes of items, and the length of that. */
+static int64_t num_pieces(int64_t bytes, int64_t chunk)
 {
-  return (rm_add_sat(rm_mul_sat(items, (int64_t)size), sizeof(rm_note)) - 1) / chunk + 1;
+  return bytes > RM_FIRST_BYTES - NOTE || (bytes > 0 && bytes > chunk - NOTE) ? (bytes - 1) / chunk + 1 : 0;
 }
+static int first_bytes(int64_t bytes, int64_t chunk) { return num_pieces(bytes, chunk) > 0 ? NOTE : NOTE + (int)bytes; }
 
-remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, size_t most, rm_flow *out)
+/* Length of the piece that starts so many bytes into the items. */
+static int piece_bytes(int64_t bytes, int64_t done, int64_t chunk) { return (int)(bytes - done < chunk ? bytes - done : chunk); }
+
+/* Where the message of neighbour i starts among those side by side, and the bytes of its items. */
+static int64_t start_of(const int64_t *offset, int i, size_t size)
 {
-  const int64_t notes  = (int64_t)sizeof(rm_note);
-  const int64_t to_all = plan->send_offset[plan->num_send], from_all = plan->recv_offset[plan->num_recv];
-  int64_t       num_requests = 0;
-  rm_flow       flow         = {.plan = plan, .most = most, .chunk = chunk};
+  return rm_add_sat(rm_mul_sat(offset[i], (int64_t)size), (int64_t)i * NOTE);
+}
+static int64_t bytes_of(const int64_t *offset, int i, size_t size) { return rm_mul_sat(offset[i + 1] - offset[i], (int64_t)size); }
 
+remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out)
+{
+  int64_t num_requests = plan->num_send;
+  rm_flow flow         = {.plan = plan, .stream = stream, .most = most, .chunk = chunk};
+
+  RM_ASSERT(sizeof *flow.arrived == RM_FIRST_BYTES);
   for (int i = 0; i < plan->num_send; i++)
-    num_requests += num_chunks(plan->send_offset[i + 1] - plan->send_offset[i], most, chunk);
+    num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->send_offset, i, most), chunk));
   for (int i = 0; i < plan->num_recv; i++)
-    num_requests += num_chunks(plan->recv_offset[i + 1] - plan->recv_offset[i], most, chunk);
-  RM_NEW(flow.sent, arena, rm_add_sat(rm_mul_sat(to_all, (int64_t)most), notes * plan->num_send));
-  RM_NEW(flow.arrived, arena, rm_add_sat(rm_mul_sat(from_all, (int64_t)most), notes * plan->num_recv));
-  RM_NEW(flow.received, arena, rm_mul_sat(from_all, (int64_t)most));
+    num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->recv_offset, i, most), chunk));
+  RM_NEW(flow.sent, arena, start_of(plan->send_offset, plan->num_send, most));
+  RM_NEW(flow.arrived, arena, plan->num_recv);
+  RM_NEW(flow.received, arena, rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most));
+  RM_NEW(flow.first, arena, plan->num_recv);
+  RM_NEW(flow.rest, arena, plan->num_recv);
   RM_NEW(flow.request, arena, num_requests);
-  RM_NEW(flow.status, arena, num_requests);
   *out = flow;
   return REMAP_OK;
 }
 
-remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, size_t most, rm_flow *out)
+remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size_t most, rm_flow *out)
 {
-  return rm_flow_init_chunked(arena, RM_COMM_CHUNK, plan, most, out);
-}
-
-/* Where the message of neighbour i starts among those side by side. */
-static int64_t start_of(const int64_t *offset, int i, size_t size)
-{
-  return offset[i] * (int64_t)size + i * (int64_t)sizeof(rm_note);
+  return rm_flow_init_chunked(arena, RM_COMM_CHUNK, plan, stream, most, out);
 }
 
 /* Items wanted by neighbour i of a plan, one after the other. */
@@ -54,90 +61,134 @@ static void gather(const rm_plan *plan, int i, size_t size, const char *item, ch
     for (int64_t k = 0; k < num; k++) memcpy(to + (size_t)k * size, item + (size_t)plan->send_item[first + k] * size, size);
 }
 
-/* Post one message, chunk by chunk. */
-static remap_status post(const rm_comm *comm, rm_flow *flow, bool is_send, int rank, char *at, int64_t bytes)
+static bool is_apart(const rm_parley *parley, int rank)
 {
-  for (int64_t done = 0; done < bytes; done += flow->chunk) {
-    const int    n       = (int)(bytes - done < flow->chunk ? bytes - done : flow->chunk);
+  return parley && parley->is_apart[rm_peers_find(parley->peers, rank)];
+}
+
+/* The tag of what follows a first message: others that are under way, or that a neighbour has in mind, have another one. */
+static int tag_of(const rm_flow *flow, uint64_t mark)
+{
+  return RM_TAG_REST + 2 * (int)(mark % 8192) + flow->stream; /* MPI promises 32767 */
+}
+
+/* Where the items of neighbour i go. */
+static char *place_of(const rm_flow *flow, int i) { return flow->received + flow->plan->recv_offset[i] * (int64_t)flow->size; }
+
+/* Post the items of one message in pieces, to or from a rank. */
+static remap_status post_pieces(const rm_comm *comm, rm_flow *flow, bool is_send, int rank, int tag, char *at, int64_t bytes)
+{
+  for (int64_t done = 0; num_pieces(bytes, flow->chunk) > 0 && done < bytes; done += flow->chunk) {
+    const int    n       = piece_bytes(bytes, done, flow->chunk);
     MPI_Request *request = &flow->request[flow->num_requests];
 
-    RM_TRY(rm_comm_status(is_send ? MPI_Isend(at + done, n, MPI_BYTE, rank, TAG_FLOW, comm->mpi, request)
-                                  : MPI_Irecv(at + done, n, MPI_BYTE, rank, TAG_FLOW, comm->mpi, request)));
+    RM_TRY(rm_comm_status(is_send ? MPI_Isend(at + done, n, MPI_BYTE, rank, tag, comm->mpi, request)
+                                  : MPI_Irecv(at + done, n, MPI_BYTE, rank, tag, comm->mpi, request)));
     flow->num_requests++;
   }
   return REMAP_OK;
 }
 
-/* Where in received the items from this rank itself go; NULL if it wants none. */
-static char *own_place(const rm_comm *comm, const rm_flow *flow)
+/* Expect neighbour i's message. */
+static remap_status expect(const rm_comm *comm, rm_flow *flow, const rm_parley *parley, int i, uint64_t mark)
 {
-  for (int i = 0; i < flow->plan->num_recv; i++)
-    if (flow->plan->recv_rank[i] == comm->rank) return flow->received + flow->plan->recv_offset[i] * (int64_t)flow->size;
-  return NULL;
+  const int rank = flow->plan->recv_rank[i];
+
+  flow->first[i] = MPI_REQUEST_NULL;
+  flow->rest[i]  = flow->num_requests;
+  if (rank == comm->rank || is_apart(parley, rank)) return REMAP_OK;
+  RM_TRY(rm_comm_status(
+      MPI_Irecv(flow->arrived[i], RM_FIRST_BYTES, MPI_BYTE, rank, RM_TAG_FIRST, comm->mpi, &flow->first[i])));
+  return post_pieces(comm, flow, false, rank, tag_of(flow, mark), place_of(flow, i),
+                     bytes_of(flow->plan->recv_offset, i, flow->size));
 }
 
-remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, size_t size, const void *item, rm_note note)
+/* Send neighbour i its message. */
+static remap_status send(const rm_comm *comm, rm_flow *flow, const rm_parley *parley, int i, const char *item, rm_note note)
+{
+  const rm_plan *plan  = flow->plan;
+  const int      rank  = plan->send_rank[i];
+  const int64_t  bytes = bytes_of(plan->send_offset, i, flow->size);
+  char          *at    = flow->sent + start_of(plan->send_offset, i, flow->size);
+
+  if (is_apart(parley, rank)) return REMAP_OK;
+  note.tag  = tag_of(flow, note.mark);
+  note.more = num_pieces(bytes, flow->chunk);
+  memcpy(at, &note, NOTE);
+  gather(plan, i, flow->size, item, at + NOTE);
+  RM_TRY(rm_comm_status(MPI_Isend(at, first_bytes(bytes, flow->chunk), MPI_BYTE, rank, RM_TAG_FIRST, comm->mpi,
+                                  &flow->request[flow->num_requests])));
+  flow->num_requests++;
+  return post_pieces(comm, flow, true, rank, note.tag, at + NOTE, bytes);
+}
+
+/* Items that this rank wants from itself. */
+static void keep_own(const rm_comm *comm, rm_flow *flow, const char *item)
+{
+  const rm_plan *plan = flow->plan;
+  int            to = 0, from = 0;
+
+  while (to < plan->num_send && plan->send_rank[to] != comm->rank) to++;
+  while (from < plan->num_recv && plan->recv_rank[from] != comm->rank) from++;
+  if (to < plan->num_send) gather(plan, to, flow->size, item, place_of(flow, from));
+}
+
+remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,
+                          rm_note note)
 {
   const rm_plan *plan = flow->plan;
 
-  RM_ASSERT(size <= flow->most && flow->num_requests == 0);
-  flow->size = size;
-  for (int i = 0; i < plan->num_recv; i++) {
-    const int64_t first = start_of(plan->recv_offset, i, size), end = start_of(plan->recv_offset, i + 1, size);
-
-    if (plan->recv_rank[i] != comm->rank)
-      RM_TRY(post(comm, flow, false, plan->recv_rank[i], flow->arrived + first, end - first));
+  RM_ASSERT(size <= flow->most && !flow->is_under_way);
+  flow->size         = size;
+  flow->is_under_way = true;
+  if (opens) {
+    rm_parley_clear(parley);
+    RM_TRY(rm_parley_post(comm, parley, plan, note));
   }
-  for (int i = 0; i < plan->num_send; i++) {
-    const int64_t first = start_of(plan->send_offset, i, size), end = start_of(plan->send_offset, i + 1, size);
-
-    if (plan->send_rank[i] == comm->rank) {
-      gather(plan, i, size, item, own_place(comm, flow));
-      continue;
-    }
-    memcpy(flow->sent + first, &note, sizeof note);
-    gather(plan, i, size, item, flow->sent + first + sizeof note);
-    RM_TRY(post(comm, flow, true, plan->send_rank[i], flow->sent + first, end - first));
-  }
+  for (int i = 0; i < plan->num_recv; i++) RM_TRY(expect(comm, flow, parley, i, note.mark));
+  for (int i = 0; i < plan->num_send; i++)
+    if (plan->send_rank[i] != comm->rank) RM_TRY(send(comm, flow, parley, i, item, note));
+  keep_own(comm, flow, item);
   return REMAP_OK;
 }
 
-/* A message longer than expected comes of a sender that has another run in mind. */
-static remap_status wait_all(rm_flow *flow)
+/* Listen to a neighbour's first message: if it is apart that is noted, what it was expected to send called off, and what it did send
+ * taken away. */
+static remap_status hear(const rm_comm *comm, rm_flow *flow, rm_parley *parley, int i, rm_note *note)
 {
-  const int    num    = flow->num_requests;
-  const int    error  = MPI_Waitall(num, flow->request, flow->status);
-  remap_status status = rm_comm_status(error);
-  int          class  = MPI_SUCCESS;
+  const int     rank  = flow->plan->recv_rank[i];
+  const int64_t bytes = bytes_of(flow->plan->recv_offset, i, flow->size), pieces = num_pieces(bytes, flow->chunk);
+  rm_note       theirs;
 
-  flow->num_requests = 0;
-  if (error != MPI_SUCCESS) MPI_Error_class(error, &class);
-  for (int i = 0; i < num && class == MPI_ERR_IN_STATUS; i++) {
-    int own = MPI_SUCCESS;
-
-    MPI_Error_class(flow->status[i].MPI_ERROR, &own);
-    if (own == MPI_ERR_TRUNCATE) status = REMAP_BAD_ARGUMENT;
-    else if (own != MPI_SUCCESS && own != MPI_ERR_PENDING) return REMAP_MPI_FAILURE;
+  RM_TRY(rm_comm_wait(&flow->first[i]));
+  memcpy(&theirs, flow->arrived[i], NOTE);
+  if (theirs.mark == note->mark && theirs.more == pieces) {
+    if (theirs.status > note->status) note->status = theirs.status;
+    if (pieces == 0 && bytes > 0) memcpy(place_of(flow, i), flow->arrived[i] + NOTE, (size_t)bytes);
+    return REMAP_OK;
   }
-  return status;
+  for (int64_t k = flow->rest[i]; k < flow->rest[i] + pieces; k++) {
+    RM_TRY(rm_comm_status(MPI_Cancel(&flow->request[k])));
+    RM_TRY(rm_comm_wait(&flow->request[k]));
+  }
+  if (bytes > 0) memset(place_of(flow, i), 0, (size_t)bytes);
+  RM_TRY(rm_comm_drain(comm, rank, &theirs));
+  if (parley) RM_TRY(rm_parley_part(comm, parley, rm_peers_find(parley->peers, rank)));
+  return REMAP_BAD_ARGUMENT;
 }
 
-remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_note *note)
+remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_parley *parley, rm_note *note)
 {
-  const rm_plan *plan = flow->plan;
-  remap_status   mine = wait_all(flow);
+  remap_status mine = parley && parley->is_open ? rm_parley_wait(comm, parley) : REMAP_OK;
 
-  if (mine != REMAP_OK) return mine;
-  for (int i = 0; i < plan->num_recv; i++) {
-    const char   *message = flow->arrived + start_of(plan->recv_offset, i, flow->size);
-    const int64_t first = plan->recv_offset[i], num_items = plan->recv_offset[i + 1] - first;
-    rm_note       theirs;
+  flow->is_under_way = false;
+  for (int i = 0; i < flow->plan->num_recv && mine <= REMAP_BAD_ARGUMENT; i++) {
+    const remap_status heard = flow->first[i] == MPI_REQUEST_NULL ? REMAP_OK : hear(comm, flow, parley, i, note);
 
-    if (plan->recv_rank[i] == comm->rank) continue;
-    memcpy(&theirs, message, sizeof theirs);
-    memcpy(flow->received + (size_t)first * flow->size, message + sizeof theirs, (size_t)num_items * flow->size);
-    if (theirs.mark != note->mark) mine = REMAP_BAD_ARGUMENT;
-    if (theirs.status > note->status) note->status = theirs.status;
+    if (heard > mine) mine = heard;
   }
+  for (int k = 0; k < flow->num_requests; k++) RM_TRY(rm_comm_wait(&flow->request[k]));
+  flow->num_requests = 0;
+  if (parley) RM_TRY(rm_parley_settle(comm, parley));
   return mine;
 }

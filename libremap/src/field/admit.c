@@ -144,8 +144,8 @@ remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, 
 {
   const int n = load->num_systems;
 
-  RM_TRY(rm_flow_init(arena, setup->giving_rows->plan, (size_t)n, &w->refusals));
-  RM_TRY(rm_flow_init(arena, setup->rows->plan, (size_t)n * sizeof(double), &w->factors));
+  RM_TRY(rm_flow_init(arena, setup->giving_rows->plan, (int)setup->giving->side, (size_t)n, &w->refusals));
+  RM_TRY(rm_flow_init(arena, setup->rows->plan, (int)setup->giving->side, (size_t)n * sizeof(double), &w->factors));
   RM_NEW(w->refused, arena, rm_mul_sat(setup->receiving->num_cells, n));
   RM_NEW(w->is_scaled, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(w->factor, arena, rm_mul_sat(setup->giving->num_cells, n));
@@ -269,10 +269,10 @@ static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_
   int64_t      any = 0;
 
   if (word->note.status == REMAP_OK) refuse(w, setup, p, got);
-  rm_word_add(word, rm_flow_post(setup->comm, &w->refusals, n, w->refused, word->note));
+  rm_word_post(word, setup->comm, &w->refusals, n, w->refused);
   rm_word_await(word, setup->comm, &w->refusals);
   if (word->note.status == REMAP_OK) any = scale_refused(w, setup, p, pack);
-  rm_word_add(word, rm_flow_post(setup->comm, &w->factors, n * sizeof(double), w->factor, word->note));
+  rm_word_post(word, setup->comm, &w->factors, n * sizeof(double), w->factor);
   rm_word_await(word, setup->comm, &w->factors);
   for (rm_lid g = 0; g < setup->rows->num_givers && word->note.status == REMAP_OK; g++)
     for (int s = 0; s < p->num_systems; s++)

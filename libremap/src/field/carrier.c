@@ -38,6 +38,7 @@ struct rm_carrier {
   remap_field_desc *fields; /* [num_fields] */
   rm_packing        packing;
   rm_word           word;
+  rm_parley         next; /* in place of the word's from the next transfer on, if it has peers */
 };
 
 /* What reports count, over all ranks. */
@@ -67,7 +68,7 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
   c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, NULL, true};
   c->keeping.given  = c->kept;
   c->keeping.number = c->kept_number;
-  return rm_profile_init(arena, &c->load, &c->keeping);
+  return rm_profile_init(arena, (int)setup->giving->side, &c->load, &c->keeping);
 }
 
 /* All memory that transfers need. Not collective. */
@@ -75,6 +76,7 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
 {
   const rm_transfer_setup *setup = &c->setup;
   const int                n     = c->load.num_fields;
+  const int                stream = (int)setup->giving->side; /* transfers either way may be under way at once */
   const size_t             bytes = (size_t)n * sizeof(double);
 
   RM_TRY(make_packing(arena, &c->load, &c->packing));
@@ -91,15 +93,37 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
       (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure, false};
   c->giving.given  = c->given;
   c->giving.number = c->number;
-  RM_TRY(rm_profile_init(arena, &c->load, &c->giving));
+  RM_TRY(rm_profile_init(arena, stream, &c->load, &c->giving));
   if (c->load.is_blended) RM_TRY(make_keeping(arena, c));
   if (c->load.is_settled) {
     RM_NEW(c->old, arena, rm_mul_sat(setup->receiving->num_cells, n));
     RM_NEW(c->sum, arena, 3 * (int64_t)n);
   }
   if (c->load.is_curved) RM_TRY(rm_admission_init(arena, setup, &c->load, &c->admission));
-  if (c->load.has_nearest) RM_TRY(rm_flow_init(arena, c->nearest->plan, bytes, &c->taken));
-  return rm_flow_init(arena, setup->rows->plan, (size_t)c->load.width * sizeof(double), &c->given_flow);
+  if (c->load.has_nearest) RM_TRY(rm_flow_init(arena, c->nearest->plan, stream, bytes, &c->taken));
+  return rm_flow_init(arena, setup->rows->plan, stream, (size_t)c->load.width * sizeof(double), &c->given_flow);
+}
+
+int rm_carrier_plans(const rm_carrier *c, const rm_plan *plan[RM_CARRIER_PLANS])
+{
+  int num = 0;
+
+  plan[num++] = c->setup.rows->plan;
+  plan[num++] = c->setup.giving_rows->plan;
+  if (c->load.has_slopes) plan[num++] = c->setup.giving_stencil->plan;
+  if (c->load.has_slopes && c->load.is_blended) plan[num++] = c->setup.keeping_stencil->plan;
+  if (c->load.has_nearest) plan[num++] = c->nearest->plan;
+  return num;
+}
+
+/* A parley with those that this carrier sends to. */
+static remap_status make_parley(rm_arena *arena, rm_carrier *c)
+{
+  const rm_plan  *plan[RM_CARRIER_PLANS];
+  const rm_peers *peers;
+
+  RM_TRY(rm_peers_build(arena, c->setup.comm, rm_carrier_plans(c, plan), plan, &peers));
+  return rm_parley_init(arena, peers, &c->next);
 }
 
 remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out,
@@ -115,8 +139,17 @@ remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, r
   if (load.has_nearest)
     RM_TRY(rm_nearest_build(arena, comm, setup->receiving, setup->receiving_stencil, setup->rows->cover, &c->nearest, reason));
   RM_TRY(rm_comm_agree(comm, make_room(arena, c), NULL));
+  RM_TRY(rm_comm_agree(comm, make_parley(arena, c), NULL));
   *out = c;
   return REMAP_OK;
+}
+
+void rm_carrier_meet(rm_carrier *c, const rm_parley *parley) { c->next = *parley; }
+
+void rm_carrier_confirm(rm_carrier *c, uint64_t mark)
+{
+  rm_word_await(&c->word, c->setup.comm, rm_profile_reads_halo(&c->packing) ? &c->giving.halo : &c->given_flow);
+  rm_word_hear(&c->word, rm_parley_confirm(c->setup.comm, &c->word.parley, mark));
 }
 
 bool rm_carrier_is_under_way(const rm_carrier *carrier) { return carrier && carrier->is_under_way; }
@@ -126,8 +159,7 @@ void rm_carrier_abandon(rm_carrier *c)
   if (!rm_carrier_is_under_way(c)) return;
   c->is_under_way = false;
   rm_profile_abandon(&c->giving, c->setup.comm, &c->word);
-  rm_profile_abandon(&c->keeping, c->setup.comm, &c->word);
-  if (c->given_flow.num_requests > 0) (void)rm_flow_wait(c->setup.comm, &c->given_flow, &c->word.note);
+  rm_word_await(&c->word, c->setup.comm, &c->given_flow);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------------------- */
@@ -181,8 +213,7 @@ static remap_status gather(rm_carrier *c)
 /* Give what is packed to those who receive it. */
 static void give(rm_carrier *c)
 {
-  rm_word_add(&c->word, rm_flow_post(c->setup.comm, &c->given_flow, (size_t)c->packing.width * sizeof(double), c->giving.pack,
-                                     c->word.note));
+  rm_word_post(&c->word, c->setup.comm, &c->given_flow, (size_t)c->packing.width * sizeof(double), c->giving.pack);
 }
 
 void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, const remap_field_desc *fields, uint64_t mark,
@@ -191,14 +222,13 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   RM_ASSERT(!c->is_under_way && rm_load_covers(c->load, rm_load_of(&c->setup, how, num_fields, fields)));
   c->is_under_way = true;
   c->how          = *how;
-  c->word         = (rm_word){{mark, (int64_t)mine}, mine, *reason};
+  c->word         = (rm_word){{mark, (int32_t)mine, 0, 0}, mine, *reason, c->next.peers ? c->next : c->word.parley, false, false, false};
+  c->next.peers   = NULL;
   for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
   rm_packing_fill(&c->packing, &c->setup, &c->how, num_fields, c->fields);
   if (mine == REMAP_OK) rm_word_add(&c->word, gather(c));
   c->how.rotation = NULL; /* the caller's again */
-  if (num_fields == 0) return;
   rm_profile_post(&c->giving, c->setup.comm, &c->packing, &c->word);
-  if (blends(c)) rm_profile_post(&c->keeping, c->setup.comm, &c->packing, &c->word);
   if (!rm_profile_reads_halo(&c->packing)) give(c);
 }
 
@@ -211,7 +241,7 @@ static void take_nearest(rm_carrier *c)
   const int         num     = c->packing.num_fields;
   const double     *got     = rm_flow_numbers(&c->taken);
 
-  rm_word_add(&c->word, rm_flow_post(c->setup.comm, &c->taken, (size_t)num * sizeof(double), c->value, c->word.note));
+  rm_word_post(&c->word, c->setup.comm, &c->taken, (size_t)num * sizeof(double), c->value);
   rm_word_await(&c->word, c->setup.comm, &c->taken);
   if (c->word.note.status != REMAP_OK) return;
   for (int64_t k = 0; k < nearest->num; k++)
@@ -256,10 +286,13 @@ static void carry(rm_carrier *c, bool wants_integral)
   for (int f = 0; f < num; f++) any_nearest |= c->setup.any_uncovered && rm_needs_nearest(&c->how, &c->fields[f]);
   if (rm_profile_reads_halo(&c->packing)) {
     rm_profile_finish(&c->giving, c->setup.comm, &c->packing, &c->word);
-    if (blends(c)) rm_profile_finish(&c->keeping, c->setup.comm, &c->packing, &c->word);
     give(c);
   }
   rm_word_await(&c->word, c->setup.comm, &c->given_flow);
+  if (blends(c)) {
+    rm_profile_post(&c->keeping, c->setup.comm, &c->packing, &c->word);
+    rm_profile_finish(&c->keeping, c->setup.comm, &c->packing, &c->word);
+  }
   receipt.got = rm_flow_numbers(&c->given_flow);
   if (has_sloped_system(&c->packing))
     rm_admission_run(&c->admission, &c->setup, &c->packing, c->giving.pack, (double *)(void *)c->given_flow.received, &c->word);
@@ -362,9 +395,11 @@ static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report 
 
 static remap_status agree_and_report(rm_carrier *c, remap_field_report *reports)
 {
-  rm_arena    *scratch = rm_arena_new();
+  rm_arena    *scratch;
   remap_status status;
 
+  if (!rm_word_count(&c->word, c->setup.comm)) return (remap_status)c->word.note.status;
+  scratch = rm_arena_new();
   rm_word_add(&c->word, scratch ? REMAP_OK : REMAP_NO_MEMORY);
   status = rm_comm_agree_reason(c->setup.comm, c->word.mine, &c->word.reason);
   if (status == REMAP_OK) status = report(c, scratch, reports);
@@ -384,7 +419,7 @@ remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *
     rm_sum_clear(&c->integral[f].minus_target);
     rm_sum_clear(&c->integral[f].magnitude);
   }
-  if (num > 0) carry(c, reports != NULL);
+  carry(c, reports != NULL);
   status = (remap_status)c->word.note.status;
   if (reports) status = agree_and_report(c, reports);
   for (int f = 0; f < num && reports && status == REMAP_OK; f++) {

@@ -96,12 +96,23 @@ typedef struct rm_carrier rm_carrier;
 remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out,
                               rm_reason *reason);
 
+/* The plans along which it sends, and their number; the same on every rank. Not collective. */
+enum { RM_CARRIER_PLANS = 5 };
+int rm_carrier_plans(const rm_carrier *carrier, const rm_plan *plan[RM_CARRIER_PLANS]);
+
+/* Hold this parley in every transfer from the next on, instead of one with the plans' neighbours, which are among its peers. */
+void rm_carrier_meet(rm_carrier *carrier, const rm_parley *parley);
+
 /* Read values, check them and send what neighbours wait for. All ranks start, but none waits. mark tells this transfer from
  * others. A failure here is kept: rm_carrier_finish hands it out, once neighbours know; so is one that the caller comes with,
  * mine and its reason: then no value is read. The load fits; none is under way. how and fields are copied; of the arrays, only
  * `out` is borrowed until the finish, which writes it. */
 void rm_carrier_start(rm_carrier *carrier, const remap_transfer *how, int num_fields, const remap_field_desc *fields,
                       uint64_t mark, remap_status mine, const rm_reason *reason);
+
+/* Tell peers how the transfer under way is to be finished; those that finish it otherwise are told. By all ranks, just before
+ * they finish it, or by none; waits for peers. */
+void rm_carrier_confirm(rm_carrier *carrier, uint64_t mark);
 
 /* Complete what was started. All ranks finish; each waits for its neighbours only, and its status is the worst of its own and
  * of those whose values it uses. With reports, [num_fields] on every rank or NULL on every rank, it is collective and the

@@ -203,12 +203,22 @@ typedef struct rm_word {
   rm_note      note; /* worst status so far                  */
   remap_status mine; /* the same without what neighbours told */
   rm_reason    reason;
+  rm_parley    parley;     /* who goes along                                                     */
+  bool         is_given;   /* something has been sent, and peers know what is under way           */
+  bool         is_counted; /* it is known whether all ranks go along, which is_complete says then */
+  bool         is_complete;
 } rm_word;
 
 /* What a step on this rank said; the first failure stays. */
 void rm_word_add(rm_word *word, remap_status status);
-/* Wait for a flow; what its senders say counts. */
+/* Send `size` bytes of each item along a flow; the first ones open the parley, and are waited for before others are sent. */
+void rm_word_post(rm_word *word, const rm_comm *comm, rm_flow *flow, size_t size, const void *item);
+/* Wait for a flow, if it is under way; what its senders say counts. */
 void rm_word_await(rm_word *word, const rm_comm *comm, rm_flow *flow);
+/* What peers said: their status of the parley. */
+void rm_word_hear(rm_word *word, remap_status status);
+/* Do all ranks go along? False, and noted, if not: then nothing collective may follow. By all ranks that go along. */
+bool rm_word_count(rm_word *word, const rm_comm *comm);
 /* One word for all ranks. True if all is well. Collective. */
 bool rm_word_agree(rm_word *word, const rm_comm *comm);
 
@@ -230,7 +240,7 @@ struct rm_profile {
 };
 
 /* Flows and room for a load on a ground, but for values. Not collective. Lives in arena. */
-remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *profile);
+remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *profile);
 /* Does a transfer read the halo? */
 bool rm_profile_reads_halo(const rm_packing *packing);
 /* Send the halo's numbers; then, once all else is done that can be without them, finish: the whole pack. Among neighbours. */

@@ -6,22 +6,44 @@
 void rm_word_add(rm_word *word, remap_status status)
 {
   if (status > word->mine) word->mine = status;
-  if ((int64_t)status > word->note.status) word->note.status = status;
+  if ((int32_t)status > word->note.status) word->note.status = (int32_t)status;
+}
+
+void rm_word_post(rm_word *word, const rm_comm *comm, rm_flow *flow, size_t size, const void *item)
+{
+  const bool opens = !word->is_given;
+
+  word->is_given = true;
+  rm_word_add(word, rm_flow_post(comm, flow, &word->parley, opens, size, item, word->note));
+}
+
+void rm_word_hear(rm_word *word, remap_status status)
+{
+  if (status == REMAP_BAD_ARGUMENT)
+    rm_fail(status, &word->reason, -1, -1,
+            "a neighbouring rank calls another function, or passes another direction, transfer, number, natures or old values "
+            "of fields, or reports where others pass NULL");
+  rm_word_add(word, status);
 }
 
 void rm_word_await(rm_word *word, const rm_comm *comm, rm_flow *flow)
 {
-  const remap_status waited = rm_flow_wait(comm, flow, &word->note);
+  if (flow->is_under_way) rm_word_hear(word, rm_flow_wait(comm, flow, &word->parley, &word->note));
+}
 
-  if (waited == REMAP_BAD_ARGUMENT)
-    rm_fail(waited, &word->reason, -1, -1,
-            "direction, transfer, number, natures or old values of fields differ from those of a neighbouring rank");
-  rm_word_add(word, waited);
+bool rm_word_count(rm_word *word, const rm_comm *comm)
+{
+  if (!word->is_counted) rm_word_add(word, rm_parley_all(comm, &word->parley, &word->is_complete));
+  word->is_counted = true;
+  if (!word->is_complete)
+    rm_word_add(word, rm_fail(REMAP_BAD_ARGUMENT, &word->reason, -1, -1, "the ranks pass different arguments"));
+  return word->is_complete;
 }
 
 bool rm_word_agree(rm_word *word, const rm_comm *comm)
 {
-  word->note.status = (int64_t)rm_comm_agree(comm, (remap_status)word->note.status, NULL);
+  if (!rm_word_count(word, comm)) return false;
+  word->note.status = (int32_t)rm_comm_agree(comm, (remap_status)word->note.status, NULL);
   return word->note.status == REMAP_OK;
 }
 
@@ -36,7 +58,7 @@ static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
   }
 }
 
-remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *p)
+remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *p)
 {
   const rm_lid   cells = p->ground.mesh->num_cells;
   const int      n     = load->num_fields;
@@ -48,12 +70,12 @@ remap_status rm_profile_init(rm_arena *arena, const rm_load *load, rm_profile *p
   RM_NEW(p->limited, arena, 2 * (int64_t)n);
   RM_NEW0(p->extreme, arena, 2 * (int64_t)n);
   if (load->has_slopes) {
-    RM_TRY(rm_flow_init(arena, plan, bytes, &p->halo));
+    RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->halo));
     mark_halo_cells(p->ground.stencil, p->needs_halo);
   }
   if (!load->is_checked) return REMAP_OK;
-  RM_TRY(rm_flow_init(arena, plan, 3 * bytes, &p->slopes));
-  RM_TRY(rm_flow_init(arena, plan, bytes, &p->roughs));
+  RM_TRY(rm_flow_init(arena, plan, stream, 3 * bytes, &p->slopes));
+  RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->roughs));
   RM_NEW(p->slope, arena, rm_mul_sat(cells, n));
   RM_NEW(p->rough, arena, rm_mul_sat(cells, n));
   RM_NEW(p->spread, arena, rm_mul_sat(cells, n));
@@ -74,7 +96,7 @@ void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packi
 
   for (int f = 0; f < 2 * packing->num_fields; f++) p->limited[f] = 0;
   if (rm_profile_reads_halo(packing)) {
-    rm_word_add(word, rm_flow_post(comm, &p->halo, bytes, p->number, word->note));
+    rm_word_post(word, comm, &p->halo, bytes, p->number);
   } else if (word->note.status == REMAP_OK) {
     rm_reconstruct(p, packing, 0);
     rm_reconstruct(p, packing, 1);
@@ -89,16 +111,16 @@ static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *pa
   const rm_numbers  numbers = {p->number, rm_flow_numbers(&p->halo)};
 
   if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope);
-  rm_word_add(word, rm_flow_post(comm, &p->slopes, 3 * bytes, p->slope, word->note));
+  rm_word_post(word, comm, &p->slopes, 3 * bytes, p->slope);
   rm_word_await(word, comm, &p->slopes);
   if (word->note.status == REMAP_OK)
     rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[3])p->slope,
                         (const double(*)[3])(const void *)p->slopes.received, p->rough);
-  rm_word_add(word, rm_flow_post(comm, &p->roughs, bytes, p->rough, word->note));
+  rm_word_post(word, comm, &p->roughs, bytes, p->rough);
   rm_word_await(word, comm, &p->roughs);
   if (word->note.status == REMAP_OK)
     rm_smooth_spread(stencil, packing, (rm_numbers){p->rough, rm_flow_numbers(&p->roughs)}, p->spread);
-  rm_word_add(word, rm_flow_post(comm, &p->roughs, bytes, p->spread, word->note));
+  rm_word_post(word, comm, &p->roughs, bytes, p->spread);
   rm_word_await(word, comm, &p->roughs);
 }
 
@@ -136,7 +158,5 @@ void rm_profile_finish(rm_profile *p, const rm_comm *comm, const rm_packing *pac
 
 void rm_profile_abandon(rm_profile *p, const rm_comm *comm, rm_word *word)
 {
-  if (p->halo.num_requests > 0) (void)rm_flow_wait(comm, &p->halo, &word->note);
-  if (p->slopes.num_requests > 0) (void)rm_flow_wait(comm, &p->slopes, &word->note);
-  if (p->roughs.num_requests > 0) (void)rm_flow_wait(comm, &p->roughs, &word->note);
+  rm_word_await(word, comm, &p->halo);
 }

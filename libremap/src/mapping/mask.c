@@ -62,18 +62,18 @@ remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapp
 
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     status = make_room(arena, &mapping->rows[side], &d[side]);
-    if (status == REMAP_OK) status = rm_flow_init(arena, mapping->rows[side].plan, 1, &flow[side]);
+    if (status == REMAP_OK) status = rm_flow_init(arena, mapping->rows[side].plan, 0, 1, &flow[side]);
   }
   RM_TRY(rm_comm_agree(comm, status, NULL));
   RM_ASSERT(masked);
   *masked = *mapping;
   for (int side = 0; side < 2; side++) {
     const uint8_t *own = side == (int)receiving ? wants : gives, *far = side == (int)receiving ? gives : wants;
-    rm_note        note = {0, REMAP_OK};
+    rm_note        note = {0, REMAP_OK, 0, 0};
     rm_rows       *rows = &masked->rows[side];
 
-    status = rm_flow_post(comm, &flow[side], 1, far, note);
-    if (status == REMAP_OK) status = rm_flow_wait(comm, &flow[side], &note);
+    status = rm_flow_post(comm, &flow[side], NULL, false, 1, far, note);
+    if (status == REMAP_OK) status = rm_flow_wait(comm, &flow[side], NULL, &note);
     if (status != REMAP_OK) break;
     filter(&mapping->rows[side], own, (const uint8_t *)flow[side].received, &d[side]);
     rows->offset = d[side].offset;
