@@ -1,5 +1,5 @@
-/* The bits of one rank on any number of ranks: pairs, fields, reports and statistics, for partitions and numberings by lot, with the
- * caller's global ids and without, masked and moved. */
+/* The bits of one rank on any number of ranks: pairs, fields, reports and statistics, for partitions and numberings by lot,
+ * with the caller's global ids and without, masked and moved. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
@@ -9,12 +9,33 @@ typedef struct world {
   tm_mesh       *mine[2];
 } world;
 
+enum { GIANTS = 1000 }; /* seeds from there on: cells that meet very many others, on either side */
+
+/* One cell around what others have in many; or two halves, one of a single cell, whose pair is one of giants. */
+static tm_mesh *make_with_giants(int side, uint64_t seed)
+{
+  static const double around[12] = {1.3, 0, 0, -.1, 0, 1.2, .1, -.15, 0, 0, 1.4, -.2};
+  const tm_warping    warp       = {.03, .1 * (double)seed};
+  const bool          is_one     = (seed + (uint64_t)side) % 2 == 0;
+
+  switch (seed / 2 % 3) {
+    case 0: return is_one ? tm_hexahedra((int[]){1, 1, 1}, tm_affine, around) : tm_tetrahedra((int[]){3, 3, 4}, tm_warp, &warp);
+    case 1:
+      return is_one ? tm_hull(tm_tetrahedra((int[]){3, 3, 3}, tm_warp, &warp))
+                    : tm_refined((int[]){3, 4, 3}, tm_checkered, NULL, NULL);
+    default:
+      return is_one ? tm_two_zones((int[]){1, 1, 1}, (int[]){4, 4, 4}, 0, tm_warp, &warp)
+                    : tm_two_zones((int[]){1, 1, 1}, (int[]){3, 5, 4}, 0, NULL, NULL);
+  }
+}
+
 static tm_mesh *make(int side, uint64_t seed)
 {
   static const double away[12] = {1, 0, 0, .25, 0, 1, 0, .2, 0, 0, 1, .3};
   const tm_warping    warp     = {.03, .1 * (double)seed};
   tm_mesh            *m;
 
+  if (seed >= GIANTS) return make_with_giants(side, seed);
   switch ((seed + (uint64_t)side) % 4) {
     case 0: m = tm_tetrahedra((int[]){3, 3, 3}, tm_warp, &warp); break;
     case 1: m = tm_refined((int[]){3, 4, 3}, tm_checkered, tm_warp, &warp); break;
@@ -77,7 +98,8 @@ static void transfer(world *w, int d, double *by_id, int64_t num_ids, remap_fiel
       u[k][c] = ldexp((double)(tm_mix_((uint64_t)give->global[c] + (uint64_t)k) % 100000) - 5e4, k ? 300 : -20);
   }
   for (int way = 0; way < WAYS; way++) {
-    const remap_field_desc f[2] = {{.nature = REMAP_CONSERVED, .in = u[0], .out = v[0]}, {.nature = REMAP_CONSERVED, .in = u[1], .out = v[1]}};
+    const remap_field_desc f[2] = {{.nature = REMAP_CONSERVED, .in = u[0], .out = v[0]},
+                                   {.nature = REMAP_CONSERVED, .in = u[1], .out = v[1]}};
     remap_transfer         how;
 
     remap_transfer_default(&how);
@@ -139,13 +161,21 @@ static void look(uint64_t seed, bool has_ids)
   close_world(&alone), close_world(&together);
 }
 
+/* Fewer where there are many ranks for few cores. */
+static uint64_t num_seeds(void) { return rt_long() ? 40 : rt_size() > 8 ? 2 : 6; }
+
 static void everything_has_the_bits_of_one_rank_with_ids(void)
 {
-  for (uint64_t seed = 1; seed <= 6; seed++) look(seed, true);
+  for (uint64_t seed = 1; seed <= num_seeds(); seed++) look(seed, true);
 }
 static void everything_has_the_bits_of_one_rank_without_ids(void)
 {
-  for (uint64_t seed = 7; seed <= 12; seed++) look(seed, false);
+  for (uint64_t seed = 101; seed <= 100 + num_seeds(); seed++) look(seed, false);
+}
+static void everything_has_the_bits_of_one_rank_with_giants(void)
+{
+  for (uint64_t k = 0; k < 6; k++) look(GIANTS + (rt_size() > 8 ? 3 * k : k), k % 2 == 0);
 }
 
-RT_MAIN(RT_CASE(everything_has_the_bits_of_one_rank_with_ids), RT_CASE(everything_has_the_bits_of_one_rank_without_ids))
+RT_MAIN(RT_CASE(everything_has_the_bits_of_one_rank_with_giants), RT_CASE(everything_has_the_bits_of_one_rank_with_ids),
+        RT_CASE(everything_has_the_bits_of_one_rank_without_ids))

@@ -702,6 +702,27 @@ static inline tm_mesh *tm_join(tm_mesh *left, tm_mesh *right)
   return mesh;
 }
 
+/* One cell inside the skin of a mesh, which is taken over. */
+static inline tm_mesh *tm_hull(tm_mesh *m)
+{
+  int64_t faces = 0, corners = 0;
+  tm_mesh *hull;
+
+  for (int64_t f = 0; f < m->view.num_faces; f++)
+    if (m->neighbour[f] < 0) faces++, corners += m->face_offset[f + 1] - m->face_offset[f];
+  hull = tm_new_(m->view.num_nodes, faces, corners, 1);
+  memcpy(hull->xyz, m->xyz, 3 * (size_t)m->view.num_nodes * sizeof *m->xyz);
+  faces = corners = 0;
+  for (int64_t f = 0; f < m->view.num_faces; f++) {
+    if (m->neighbour[f] >= 0) continue;
+    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) hull->face_node[corners++] = m->face_node[k];
+    hull->neighbour[faces]     = -1;
+    hull->face_offset[++faces] = corners;
+  }
+  tm_free(m);
+  return hull;
+}
+
 /* Two zones of hexahedra that fill the unit cube, patched at x = 1/2: `left` and `right` boxes, which need not match there.
  * The right zone begins at 1/2 + gap: below 0, the zones overlap; above, they gape. With gap 0 and boxes that match, the nodes
  * at the patch agree bitwise. */

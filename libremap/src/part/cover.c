@@ -1,6 +1,6 @@
-/* cover -- the part for the supermesh: every rank gets a share of the cells of both meshes that meet, its core, and all cells that
- * touch these, of both meshes. The core is cut along the same curve as the part of rm_part_build, evenly by numbers; what touches
- * it is found by boxes. O(n log n) time; besides the part, memory for keys, boxes and routes. */
+/* cover -- the part for the supermesh: every rank gets a share of the cells of both meshes that meet, its core, and all cells
+ * that touch these, of both meshes. The core is cut along the same curve as the part of rm_part_build, evenly by numbers; what
+ * touches it is found by boxes. O(n log n) time; besides the part, memory for keys, boxes and routes. */
 #include "part/part_private.h"
 
 typedef struct work {

@@ -1,9 +1,9 @@
 /* cut -- intervals of Morton keys, one per rank: first of even numbers of cells, then of even estimated work.
  *
- * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are exact quantiles, depend on the zone's cells and not on
- * who hands them in, and cells of equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all ranks of
- * WAYS - 1 numbers per cut, for which a rank walks along its keys once. Tags that lie in order over the ranks are cut by adding up:
- * O(n) and two small collectives. */
+ * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are exact quantiles, depend on the zone's cells and
+ * not on who hands them in, and cells of equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all
+ * ranks of WAYS - 1 numbers per cut, for which a rank walks along its keys once. Tags that lie in order over the ranks are cut
+ * by adding up: O(n) and two small collectives. */
 #include "part/part_private.h"
 
 #include <float.h>
@@ -132,8 +132,8 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   return REMAP_OK;
 }
 
-/* One round: WAYS - 1 probes divide each cut's range evenly; it shrinks to the part before the first probe above the goal. Ranges
- * of two cuts are the same or apart, so that the probes ascend. */
+/* One round: WAYS - 1 probes divide each cut's range evenly; it shrinks to the part before the first probe above the goal.
+ * Ranges of two cuts are the same or apart, so that the probes ascend. */
 static remap_status narrow(const rm_comm *comm, search *s)
 {
   int64_t at = 0;

@@ -1,6 +1,6 @@
 /* giant -- a cell that meets more than one in GIANT_SHARE times the ranks of the other mesh's cells would bring them all to its
- * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from the coarse boxes of the other
- * mesh's tags, of which every rank knows all: O(n log B) time for n tags and B boxes, at most RM_ZONE_BOXES per rank. */
+ * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from the coarse boxes of the
+ * other mesh's tags, of which every rank knows all: O(n log B) time for n tags and B boxes, at most RM_ZONE_BOXES per rank. */
 #include "part/part_private.h"
 
 #include <string.h>
@@ -9,50 +9,6 @@ enum {
   GIANT_SHARE = 8, /* so a rank's work is settled to an eighth at worst, usually far better */
   FEW_CELLS   = 32 /* no cell that meets fewer is a giant                                   */
 };
-
-/* This rank's boxes of a side, around the tags that are no giants. Not collective. */
-static remap_status group(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowd *mine, int *num_mine)
-{
-  double (*box)[6], group[RM_ZONE_BOXES][6];
-  rm_lid num = 0;
-
-  RM_NEW(box, arena, tags->num[side]);
-  for (rm_lid k = 0; k < tags->num[side]; k++)
-    if (!tags->tag[side][k].is_giant) memcpy(box[num++], tags->box[side][k], sizeof *box);
-  RM_TRY(rm_box_groups(arena, num, (const double(*)[6])box, rm_zone_boxes(comm->size), group, num_mine));
-  for (int g = 0; g < *num_mine; g++) {
-    memcpy(mine[g].box, group[g], sizeof group[g]);
-    mine[g].rank = comm->rank;
-    mine[g].num  = (double)num / *num_mine;
-  }
-  return REMAP_OK;
-}
-
-/* A tree over the crowds. Not collective. */
-static remap_status grow_tree(rm_arena *arena, int64_t num, const rm_crowd *crowd, rm_crowds *out)
-{
-  double (*box)[6];
-
-  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_NEW(box, arena, num);
-  for (int64_t g = 0; g < num; g++) memcpy(box[g], crowd[g].box, sizeof *box);
-  *out = (rm_crowds){.num = (rm_lid)num, .crowd = crowd, .box = (const double(*)[6])box};
-  return rm_boxtree_build(arena, (rm_lid)num, out->box, &out->tree);
-}
-
-remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out)
-{
-  rm_crowd    *mine     = rm_arena_alloc(arena, RM_ZONE_BOXES, sizeof *mine);
-  int64_t     *offset   = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset);
-  int          num_mine = 0;
-  void        *all;
-  remap_status status = mine && offset ? group(arena, comm, tags, side, mine, &num_mine) : REMAP_NO_MEMORY;
-
-  RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_ASSERT(mine && offset);
-  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num_mine, sizeof *mine, offset, &all));
-  return rm_comm_agree(comm, grow_tree(arena, offset[comm->size], all, out), NULL);
-}
 
 /* How many of the crowds' cells a box meets, about: of each crowd the part of its box that it covers. */
 typedef struct tally {

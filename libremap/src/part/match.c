@@ -5,18 +5,11 @@
  *     small    giant       the seat of the source
  *     giant    giant       the seat of the target
  *
- * A rank needs the targets seated there, the source cells whose boxes they meet, and the other partners of its pairs. Source tags go
- * to the ranks of whose small targets they meet a coarse box; those are mostly the neighbours along the Morton curve. So no cell is sent in
- * vain, for 56 bytes per candidate. O(n log n) time. */
+ * A rank needs the targets seated there, the source cells whose boxes they meet, and the other partners of its pairs. It knows
+ * the boxes of all that may be, so no cell is sent in vain. O(n log n) time. */
 #include "part/part_private.h"
 
 #include <string.h>
-
-/* A source cell that may be wanted elsewhere. */
-typedef struct candidate {
-  int32_t home_rank;
-  rm_lid  cell;
-} candidate;
 
 /* What this rank's decisions rest on. */
 typedef struct here {
@@ -27,9 +20,7 @@ typedef struct here {
   rm_lid            num_small;    /* targets seated here that are no giants */
   const double    (*small)[6];    /* their boxes                            */
   const rm_boxtree *small_tree;
-  int64_t           num_arrived;
-  const candidate  *arrived;       /* [num_arrived] sources of other seats */
-  const double    (*arrived_box)[6];
+  rm_visitors       visitors;      /* sources of other seats                */
   uint8_t          *is_wanted;     /* [giants->num] */
 } here;
 
@@ -45,93 +36,6 @@ static remap_status plant(rm_arena *arena, here *h)
     if (!tags->tag[REMAP_TARGET][k].is_giant) memcpy(small[h->num_small++], tags->box[REMAP_TARGET][k], sizeof *small);
   h->small = (const double(*)[6])small;
   return rm_boxtree_build(arena, h->num_small, h->small, &h->small_tree);
-}
-
-/* ---- candidates --------------------------------------------------------------------------------------------------- */
-
-/* What a source's query adds to: the ranks it has met. */
-typedef struct meeting {
-  const rm_crowds *crowds;
-  int64_t         *next;      /* [comm->size] how many sources meet a rank, or where the next one goes */
-  rm_lid          *last;      /* [comm->size] the tag that met a rank last                             */
-  rm_lid          *list;      /* where the tags go, or NULL to count                                   */
-  rm_lid           tag;       /* the one that asks                                                     */
-} meeting;
-
-/* A source meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
-static int meet_rank(void *user, rm_lid item)
-{
-  meeting      *m    = user;
-  const int64_t rank = m->crowds->crowd[item].rank;
-
-  if (m->last[rank] == m->tag) return 0;
-  m->last[rank] = m->tag;
-  if (m->list) m->list[m->next[rank]] = m->tag;
-  m->next[rank]++;
-  return 0;
-}
-
-/* Every small source seated here asks which crowds of other ranks it meets. */
-static void meet_all(const here *h, meeting *m)
-{
-  for (int r = 0; r < h->comm->size; r++) m->last[r] = -1;
-  for (rm_lid k = 0; k < h->tags->num[REMAP_SOURCE]; k++) {
-    if (h->tags->tag[REMAP_SOURCE][k].is_giant) continue;
-    m->tag                    = k;
-    m->last[h->comm->rank] = k;
-    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, h->tags->box[REMAP_SOURCE][k], meet_rank, m);
-  }
-}
-
-/* The candidates for other ranks: counted in a first walk, listed in a second, so that the list needs no more room than it has
- * entries; offset is [comm->size + 1]. Not collective. */
-static remap_status list_candidates(rm_arena *arena, const here *h, const rm_crowds *crowds, int64_t *offset, candidate **out,
-                                    double (**box)[6])
-{
-  const int size = h->comm->size;
-  meeting   m    = {.crowds = crowds};
-  rm_lid   *list;
-  int64_t   num;
-
-  RM_NEW(m.last, arena, size);
-  RM_NEW0(m.next, arena, size);
-  meet_all(h, &m);
-  for (int r = 0; r < size; r++) offset[r] = m.next[r];
-  num = rm_offsets(offset, size);
-  RM_NEW(list, arena, num);
-  RM_NEW(*out, arena, num);
-  RM_NEW(*box, arena, num);
-  for (int r = 0; r < size; r++) m.next[r] = offset[r];
-  m.list = list;
-  meet_all(h, &m);
-  for (int64_t k = 0; k < num; k++) {
-    const rm_tag *tag = &h->tags->tag[REMAP_SOURCE][list[k]];
-
-    (*out)[k] = (candidate){tag->home_rank, tag->cell};
-    memcpy((*box)[k], h->tags->box[REMAP_SOURCE][list[k]], sizeof **box);
-  }
-  return REMAP_OK;
-}
-
-/* Tell other ranks of sources that may meet their targets. Collective. */
-static remap_status exchange_candidates(rm_arena *arena, here *h, const rm_crowds *crowds)
-{
-  const int    size    = h->comm->size;
-  int64_t     *offset  = rm_arena_alloc(arena, (int64_t)size + 1, sizeof *offset);
-  int64_t     *arrived = rm_arena_alloc(arena, (int64_t)size + 1, sizeof *arrived);
-  candidate   *out     = NULL;
-  double     (*box)[6] = NULL;
-  void        *who, *where;
-  remap_status status = offset && arrived ? list_candidates(arena, h, crowds, offset, &out, &box) : REMAP_NO_MEMORY;
-
-  RM_TRY(rm_comm_agree(h->comm, status, NULL));
-  RM_ASSERT(offset && arrived);
-  RM_TRY(rm_comm_exchange(h->comm, arena, sizeof *out, offset, out, arrived, &who));
-  RM_TRY(rm_comm_exchange(h->comm, arena, sizeof *box, offset, box, arrived, &where));
-  h->num_arrived = arrived[size];
-  h->arrived     = who;
-  h->arrived_box = where;
-  return REMAP_OK;
 }
 
 /* ---- wants -------------------------------------------------------------------------------------------------------- */
@@ -174,8 +78,9 @@ static void want_small_sources(here *h, list *l)
     (void)rm_boxtree_query(h->giants->tree, h->giants->box, box, meet_giant, &p);
     if (p.met || rm_boxtree_meets(h->small_tree, h->small, box)) want(l, tag->home_rank, tag->cell, RM_ROLE_SEATED);
   }
-  for (int64_t k = 0; k < h->num_arrived; k++)
-    if (rm_boxtree_meets(h->small_tree, h->small, h->arrived_box[k])) want(l, h->arrived[k].home_rank, h->arrived[k].cell, 0);
+  for (rm_lid k = 0; k < h->visitors.num; k++)
+    if (rm_boxtree_meets(h->small_tree, h->small, h->visitors.box[k]))
+      want(l, h->visitors.visitor[k].home_rank, h->visitors.visitor[k].cell, 0);
 }
 
 /* Giant sources that meet a small target here; and both partners of pairs of giants whose target has its seat here. */
@@ -197,8 +102,8 @@ static remap_status list_wants(rm_arena *arena, here *h, list l[2])
 {
   const rm_tags *tags = h->tags;
 
-  RM_NEW(l[REMAP_SOURCE].want, arena, tags->num[REMAP_SOURCE] + h->num_arrived + h->giants->num);
-  RM_NEW(l[REMAP_TARGET].want, arena, h->num_small + h->giants->num);
+  RM_NEW(l[REMAP_SOURCE].want, arena, (int64_t)tags->num[REMAP_SOURCE] + h->visitors.num + h->giants->num);
+  RM_NEW(l[REMAP_TARGET].want, arena, (int64_t)h->num_small + h->giants->num);
   want_giants(h);
   want_small_sources(h, &l[REMAP_SOURCE]);
   for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++) {
@@ -259,11 +164,9 @@ remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *co
 {
   here      h = {.comm = comm, .cuts = cuts, .tags = tags, .giants = giants};
   list      l[2] = {{0, NULL}, {0, NULL}};
-  rm_crowds crowds;
 
   RM_TRY(rm_comm_agree(comm, plant(scratch, &h), NULL));
-  RM_TRY(rm_part_crowds(scratch, comm, tags, REMAP_TARGET, &crowds));
-  RM_TRY(exchange_candidates(scratch, &h, &crowds));
+  RM_TRY(rm_part_receive_visitors(scratch, comm, tags, &h.visitors));
   RM_TRY(rm_comm_agree(comm, list_wants(scratch, &h, l), NULL));
   for (int side = 0; side < 2; side++) RM_TRY(ask(arena, scratch, comm, &l[side], side, out));
   return REMAP_OK;

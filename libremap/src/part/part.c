@@ -1,11 +1,11 @@
 /* part -- the stages in order: tags to their seats, giants, weights, cuts of even work, what each rank needs, and the cells
- * themselves; and the check of what comes out. What a stage needs on the way is dropped before the next, so memory peaks at the product,
- * the routes, and the tags or what one mesh sends and receives. */
+ * themselves; and the check of what comes out. What a stage needs on the way is dropped before the next, so memory peaks at the
+ * product, the routes, and the tags or what one mesh sends and receives. */
 #include "part/part_private.h"
 
 /* Weigh the tags where they are, and move them into intervals of even work. Collective. *moved lives in arena. */
-static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
-                            rm_tags *tags, rm_giants *giants, rm_cuts *cuts, rm_tags *moved, rm_reason *reason)
+static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], rm_tags *tags,
+                            rm_giants *giants, rm_cuts *cuts, rm_tags *moved, rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new();
   int64_t     *work[2];
@@ -13,7 +13,7 @@ static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_frame
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_GOTO(done, status = rm_part_find_giants(arena, scratch, comm, tags, giants));
-  RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, zone_frame, mesh, tags, giants, work));
+  RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, mesh, tags, giants, work));
   RM_GOTO(done, status = rm_part_cut_work(arena, comm, tags, work, cuts));
   RM_GOTO(done, status = rm_part_move_tags(arena, comm, tags, cuts, moved, reason));
 done:
@@ -48,7 +48,7 @@ static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm
   RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
   RM_TRY(seat_evenly(scratch, comm, &zone_frame, mesh, zone, &cuts, &tags, reason));
   if (comm->size > 1) {
-    RM_TRY(balance(scratch, comm, &zone_frame, mesh, &tags, &giants, &cuts, &moved, reason));
+    RM_TRY(balance(scratch, comm, mesh, &tags, &giants, &cuts, &moved, reason));
   } else {
     RM_TRY(rm_part_know_giants(scratch, 0, NULL, &giants));
     moved = tags;
@@ -138,9 +138,9 @@ static bool senders_are_apart(const rm_piece *p, uint8_t *node_is_used)
   return true;
 }
 
-/* Faces close every cell: each edge is used as often one way as the other. (A cell that collapsed to a line or a point has none.)
- * Edges are hashed and the hashes added with the sign of their direction; a missing or turned face leaves a sum that is not zero
- * but with a chance of 2^-64. */
+/* Faces close every cell: each edge is used as often one way as the other. (A cell that collapsed to a line or a point has
+ * none.) Edges are hashed and the hashes added with the sign of their direction; a missing or turned face leaves a sum that is
+ * not zero but with a chance of 2^-64. */
 static bool cells_are_closed(const rm_piece *p, uint64_t *sum)
 {
   for (rm_lid f = 0; f < p->num_faces; f++) {

@@ -1,10 +1,10 @@
 /* part -- the zone in; out the cells of both meshes that this rank overlays. The Morton curve through the zone is cut into one
- * interval per rank, of even estimated work; the interval that holds the centre of a cell's box is the cell's seat. A target cell goes
- * to its seat, a source cell to every rank that has a target cell whose box it meets.
+ * interval per rank, of even estimated work; the interval that holds the centre of a cell's box is the cell's seat. A target
+ * cell goes to its seat, a source cell to every rank that has a target cell whose box it meets.
  *
- * A cell that meets a large part of the other mesh (a closed surface, a huge background cell) is a giant: it is replicated to the seats
- * of the cells it meets, and its pairs are made there. So every pair of cells is made on exactly one rank, and no rank gets all
- * cells of a mesh because of one cell of the other. */
+ * A cell that meets a large part of the other mesh (a closed surface, a huge background cell) is a giant: it is replicated to
+ * the seats of the cells it meets, and its pairs are made there. So every pair of cells is made on exactly one rank, and no
+ * rank gets all cells of a mesh because of one cell of the other. */
 #ifndef RM_PART_H
 #define RM_PART_H
 
@@ -40,8 +40,8 @@ typedef struct rm_part {
   rm_piece piece[2]; /* [side] */
 } rm_part;
 
-/* Whether the pair of two cells of the pieces is made on this rank: with a small target at its seat, where it is alone; else at the
- * seat of the source, or of the target if both are giants. Not collective. */
+/* Whether the pair of two cells of the pieces is made on this rank: with a small target at its seat, where it is alone; else at
+ * the seat of the source, or of the target if both are giants. Not collective. */
 static inline bool rm_part_makes_pair(const rm_part *part, rm_lid source, rm_lid target)
 {
   const uint8_t *of_source = part->piece[0].cell_role, *of_target = part->piece[1].cell_role;
@@ -57,9 +57,9 @@ typedef struct rm_routes rm_routes;
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                           const rm_zone *zone, const rm_routes **out, rm_reason *reason);
 
-/* Send the cells of one mesh there. Collective. The routes may have been made for the same cells in another position. *out lives in
- * arena, its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not
- * let results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
+/* Send the cells of one mesh there. Collective. The routes may have been made for the same cells in another position. *out
+ * lives in arena, its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later
+ * rooms must not let results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
 remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
                           rm_reason *reason);
 
@@ -69,9 +69,9 @@ remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame 
 /* Every invariant above; slow. Not collective. */
 remap_status rm_part_check(const rm_part *part);
 
-/* The part that a supermesh is made from. Each cell whose box meets the other mesh is core on exactly one rank, if it is asked for;
- * a rank has every cell of either mesh whose box meets that of one of its core cells, so what is made of these here is what would be
- * made of them anywhere. Read-only once built. */
+/* The part that a supermesh is made from. Each cell whose box meets the other mesh is core on exactly one rank, if it is asked
+ * for; a rank has every cell of either mesh whose box meets that of one of its core cells, so what is made of these here is
+ * what would be made of them anywhere. Read-only once built. */
 typedef struct rm_cover {
   rm_part        part;
   int            owner;     /* side whose core cells make what lies in both meshes: that of more cells that meet the other */

@@ -1,7 +1,8 @@
-/* part_private -- the stages of rm_part_build. What a rank needs to know of a cell to decide where it is overlaid is its tag, far
- * smaller than the cell with its faces: tags are sorted along the Morton curve over all ranks, and only then cells move.
+/* part_private -- the stages of rm_part_build. What a rank needs to know of a cell to decide where it is overlaid is its tag,
+ * far smaller than the cell with its faces: tags are sorted along the Morton curve over all ranks, and only then cells move.
  *
  *   tag      tags of the zone's cells go to the ranks in whose interval of keys they lie, at first of equal numbers (cut)
+ *   crowd    coarse boxes tell every rank where the others' tags are
  *   giant    the cells that meet a large part of the other mesh are found, and known to all ranks
  *   weigh    estimates the work that each cell's pairs make; intervals of equal work are cut, and the tags move on
  *   match    every rank lists the cells it needs, and asks their homes for them
@@ -30,8 +31,8 @@ struct rm_routes {
   uint8_t *role[2]; /* [side][num[side]] RM_ROLE_ of each, in the order they come in */
 };
 
-/* Where the intervals end: rank r has the keys from key[r - 1] up to but not including key[r]; the first and the last rank's are
- * open. Ascending. */
+/* Where the intervals end: rank r has the keys from key[r - 1] up to but not including key[r]; the first and the last rank's
+ * are open. Ascending. */
 typedef struct rm_cuts {
   int             num; /* comm->size - 1 */
   const uint64_t *key; /* [num]          */
@@ -43,7 +44,9 @@ typedef struct rm_tag {
   int32_t  home_rank;     /* who handed it in         */
   rm_lid   cell;          /* its number there         */
   int32_t  num_triangles; /* of its faces, about; a face between two cells counts half */
+  float    fill;          /* volume over that of the box */
   int32_t  is_giant;
+  int32_t  unused;        /* no padding on the wire */
 } rm_tag;
 
 /* The tags in this rank's interval. Read-only once sent, but for is_giant. Ascending by key. */
@@ -83,6 +86,20 @@ typedef struct rm_crowds {
   const rm_boxtree *tree;     /* over them */
 } rm_crowds;
 
+/* A source tag of another seat that may meet a target here. */
+typedef struct rm_visitor {
+  int32_t home_rank;
+  rm_lid  cell;
+  int32_t num_triangles;
+  float   fill;
+} rm_visitor;
+
+typedef struct rm_visitors {
+  rm_lid            num;
+  const rm_visitor *visitor; /* [num] */
+  const double    (*box)[6]; /* [num] */
+} rm_visitors;
+
 /* The frame with its box narrowed to the zone's cells, all ranks: Morton keys then resolve the zone and not what lies around
  * it. Collective. */
 remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], const rm_zone *zone,
@@ -103,8 +120,9 @@ remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const 
 remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                                 const rm_zone *zone, rm_cuts *out);
 
-/* Cut tags, which lie in order over the ranks, into intervals of equal work; work [side][tags->num[side]] is not negative. A tag
- * goes to the side of the cut on which most of it lies. Collective. *out lives in arena, as does what is needed on the way. */
+/* Cut tags, which lie in order over the ranks, into intervals of equal work; work [side][tags->num[side]] is not negative. A
+ * tag goes to the side of the cut on which most of it lies. Collective. *out lives in arena, as does what is needed on the
+ * way. */
 remap_status rm_part_cut_work(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int64_t *const work[2], rm_cuts *out);
 
 /* Send the tags of this rank's cells of the zone to their seats. Collective. *out lives in arena, what is needed on the way in
@@ -119,7 +137,12 @@ remap_status rm_part_move_tags(rm_arena *arena, const rm_comm *comm, const rm_ta
 /* Boxes around the tags of a side that are no giants. Collective. *out lives in arena. */
 remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out);
 
-/* Mark the tags of giants, and tell all ranks of them. Collective. *out lives in arena, what is needed on the way in scratch. */
+/* The source tags of other ranks, but for giants, that meet a crowd of this rank's targets. Collective. *out lives in arena,
+ * with what is needed on the way. TOO_LARGE. */
+remap_status rm_part_receive_visitors(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, rm_visitors *out);
+
+/* Mark the tags of giants, and tell all ranks of them. Collective. *out lives in arena, what is needed on the way in
+ * scratch. */
 remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out);
 
 /* These giants, and a tree over them. Not collective. *out borrows giant, [num], the rest lives in arena. */
@@ -127,21 +150,21 @@ remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *g
 
 /* An estimate of the work that is done at its seat because of each tag, in units of 1/64 of what an edge and a face that cross
  * cost. Collective. *work[side], [tags->num[side]], live in arena, what is needed on the way in scratch. */
-remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
-                           const rm_mesh *const mesh[2], const rm_tags *tags, const rm_giants *giants, int64_t *work[2]);
+remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
+                           const rm_tags *tags, const rm_giants *giants, int64_t *work[2]);
 
-/* What every rank needs, as routes of this rank's cells: targets at their seats, the source cells whose boxes they meet, and giants.
- * Collective. *out lives in arena, what is needed on the way in scratch. */
+/* What every rank needs, as routes of this rank's cells: targets at their seats, the source cells whose boxes they meet, and
+ * giants. Collective. *out lives in arena, what is needed on the way in scratch. */
 remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
                            const rm_giants *giants, rm_routes *out);
 
-/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target` puts
- * them. Collective. *out lives in arena, as does what is needed on the way. */
+/* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target`
+ * puts them. Collective. *out lives in arena, as does what is needed on the way. */
 remap_status rm_part_touch(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], const rm_zone *zone,
                            const rm_route *target, rm_route *out, rm_reason *reason);
 
-/* Send the cells of a route with their faces and nodes, and put together what arrives, but for its roles. Collective. *out lives in
- * arena, what is needed on the way in scratch. TOO_LARGE if more arrives than a rank can number. */
+/* Send the cells of a route with their faces and nodes, and put together what arrives, but for its roles. Collective. *out
+ * lives in arena, what is needed on the way in scratch. TOO_LARGE if more arrives than a rank can number. */
 remap_status rm_part_ship(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_route *route,
                           rm_piece *out, rm_reason *reason);
 

@@ -2,6 +2,7 @@
  * settled who needs them. O(n) time to sort n tags by rank and, where they arrive, by key. */
 #include "part/part_private.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Triangles that a cell's faces have, about: a face of n corners has n in a fan about its centre, and serves two cells. */
@@ -12,6 +13,14 @@ static int32_t triangles_of(const rm_mesh *mesh, rm_lid cell)
   for (int64_t i = mesh->cell_face_offset[cell]; i < mesh->cell_face_offset[cell + 1]; i++)
     corners += mesh->face_offset[mesh->cell_face[i] + 1] - mesh->face_offset[mesh->cell_face[i]];
   return corners / 2 < INT32_MAX ? (int32_t)(corners / 2) : INT32_MAX;
+}
+
+/* How much of its box a cell fills. */
+static float fill_of(const rm_mesh *mesh, rm_lid cell)
+{
+  const double *box = mesh->cell_box[cell], volume = (box[3] - box[0]) * (box[4] - box[1]) * (box[5] - box[2]);
+
+  return volume > 0 ? (float)fmin(fabs(mesh->cell_volume[cell]) / volume, 1) : 1;
 }
 
 /* The tags of a route's cells. Not collective. */
@@ -26,7 +35,7 @@ static remap_status make_tags(rm_arena *scratch, const rm_comm *comm, const rm_f
     const rm_lid  c   = route->cell[k];
     const double *own = mesh->cell_box[c];
 
-    (*tag)[k] = (rm_tag){rm_part_key(zone_frame, own), comm->rank, c, triangles_of(mesh, c), 0};
+    (*tag)[k] = (rm_tag){rm_part_key(zone_frame, own), comm->rank, c, triangles_of(mesh, c), fill_of(mesh, c), 0, 0};
     memcpy((*box)[k], own, sizeof **box);
   }
   return REMAP_OK;

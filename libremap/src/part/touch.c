@@ -1,6 +1,6 @@
-/* touch -- which cells of a mesh meet which rank's cells of another, or of the same. Every rank gathers the coarse boxes of what every
- * rank holds; the boxes of the cells that meet those travel there, are held against the cells themselves, and the answers come back.
- * So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
+/* touch -- which cells of a mesh meet which rank's cells of another, or of the same. Every rank gathers the coarse boxes of
+ * what every rank holds; the boxes of the cells that meet those travel there, are held against the cells themselves, and the
+ * answers come back. So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
 #include "part/part_private.h"
 
 /* Where the targets are: those of this rank by box, those of all ranks by groups. */

@@ -1,101 +1,141 @@
 /* weigh -- what the overlay will cost, cell by cell, before it is made.
  *
- * Tracing and summing cost most, in proportion to how often edges and faces cross; then what every cell costs by itself. Pairs are
- * made at the seat of the target, so the target bears it. If boxes of extents s fill space, a box of extents h meets
+ * Tracing and summing cost most, in proportion to how often edges and faces cross; then what every cell costs by itself. Pairs
+ * are made at the seat of the target, so the target bears it. Where boxes i fill space, a box j meets as many of them as
  *
- *     prod_d (h_d + s_d) / (s_x s_y s_z)  =  1  +  sum_d h_d / s_d  +  sum_d h_e h_f / (s_e s_f)  +  h_x h_y h_z / (s_x s_y s_z)
+ *     1  +  its edges cross their faces  +  their edges cross its faces  +  their corners lie in it, an eighth each,
  *
- * of them: where its corner is, along its edges, across its faces, and inside. The second term is how often its edges cross their
- * faces, the third how often their edges cross its faces, the last how many of them it has to itself. s is taken from the source
- * cells around it on the Morton curve, in the smallest block that is as large as the box and holds FEW of them: sums over their
- * boxes of the products of any of their extents give the means wanted, each cell counted by the volume it fills.
+ * the 1 for its own corners in them. So crossings are counted by boxes that meet less corners within; and the last term shares
+ * out what the sources cost. Cells that fill little of their boxes, turned hexahedra or tetrahedra, meet more boxes, by as much
+ * as these overlap: their crossings count by the geometric mean of what the two cells fill.
  *
- * Giants are left out of this; what they cost is counted, box by box, where their faces meet cells. A source cell that is paired with
- * a giant bears the cost at its own seat. O(n log n) time, 72 bytes per source and 48 per face of a giant that comes here. */
+ * Giants are left out of this; what they cost is counted where the boxes of their faces meet cells. A source cell that is
+ * paired with a giant bears the cost at its own seat. O(n log n) time, and a visit for each pair of boxes, 90 bytes per
+ * source. */
 #include "part/part_private.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { FEW = 8, NUM_PRODUCTS = 8, ALL_AXES = NUM_PRODUCTS - 1, CURVE_LEVELS = RM_KEY_BITS / 3 };
+/* What is counted, in 1/64 of a crossing of a box's edge with another's face, which stands for some six of an edge with a
+ * triangle: 64/6 is half a microsecond. SLENDER times: where sums of slender cells are likely to need double-double. From user
+ * times and counts of bench_balance. */
+enum { CROSSING = 64, SLENDER = 3, TRIANGLE = 10, GIANT_FACE = 16 };
 
-/* What is counted, in 1/64 of a crossing of an edge and a face. Least squares of user time over the meshes of bench_balance. */
-enum { CROSSING = 64, TRIANGLE = 3, PAIR = 4, GIANT_FACE = 32 };
+/* Boxes of thin and slanting cells meet very many others; their neighbours on the curve are then not looked at, but weigh the
+ * same. */
+enum { MOST_VISITS = 32 };
 
-/* The source cells of this rank on the curve. */
-typedef struct density {
-  rm_lid    num;
-  uint64_t *key;                   /* [num] ascending                                                             */
-  double  (*sum)[NUM_PRODUCTS];    /* [num + 1] over the cells before: products of the extents of the axes in a mask */
-  double    steps;                 /* of the curve per unit length                                                */
-} density;
+/* ---- pairs of small cells ----------------------------------------------------------------------------------------- */
 
-static remap_status find_density(rm_arena *scratch, const rm_frame *frame, const rm_tags *tags, density *out)
+/* The small sources whose boxes may meet a target here. */
+typedef struct sources {
+  double          (*box)[6];
+  rm_visitor       *as; /* what they are */
+  const rm_boxtree *tree;
+} sources;
+
+static remap_status gather_sources(rm_arena *scratch, const rm_tags *tags, const rm_visitors *visitors, sources *out)
 {
-  density d      = {.num = 0};
-  double  extent = 0;
+  const int64_t most = (int64_t)tags->num[REMAP_SOURCE] + visitors->num;
+  rm_lid        num  = 0;
 
-  for (int a = 0; a < 3; a++) extent = fmax(extent, frame->box[a + 3] - frame->box[a]);
-  d.steps = extent > 0 ? ldexp(1, CURVE_LEVELS) / extent : 0;
-  RM_NEW(d.key, scratch, tags->num[REMAP_SOURCE]);
-  RM_NEW(d.sum, scratch, (int64_t)tags->num[REMAP_SOURCE] + 1);
-  for (int m = 0; m < NUM_PRODUCTS; m++) d.sum[0][m] = 0;
+  RM_REQUIRE(most <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(out->box, scratch, most);
+  RM_NEW(out->as, scratch, most);
   for (rm_lid k = 0; k < tags->num[REMAP_SOURCE]; k++) {
-    const double *box = tags->box[REMAP_SOURCE][k];
+    const rm_tag *tag = &tags->tag[REMAP_SOURCE][k];
 
-    if (tags->tag[REMAP_SOURCE][k].is_giant) continue;
-    for (int m = 0; m < NUM_PRODUCTS; m++) {
-      double product = 1;
+    if (tag->is_giant) continue;
+    memcpy(out->box[num], tags->box[REMAP_SOURCE][k], sizeof *out->box);
+    out->as[num++] = (rm_visitor){tag->home_rank, tag->cell, tag->num_triangles, tag->fill};
+  }
+  for (rm_lid k = 0; k < visitors->num; k++) {
+    memcpy(out->box[num], visitors->box[k], sizeof *out->box);
+    out->as[num++] = visitors->visitor[k];
+  }
+  return rm_boxtree_build(scratch, num, (const double(*)[6])out->box, &out->tree);
+}
 
-      for (int a = 0; a < 3; a++)
-        if (m >> a & 1) product *= box[a + 3] - box[a];
-      d.sum[d.num + 1][m] = d.sum[d.num][m] + product;
+/* What a target causes. */
+typedef struct estimate {
+  const sources *s;
+  const double  *box;
+  double         extent, volume; /* largest extent of the box; volume of the cell */
+  double         crossings, triangles; /* the latter of the sources it has to itself */
+  int64_t        visits;
+} estimate;
+
+/* How many of the lowest and the highest corner of another box a box has in it, in halves. */
+static inline double corners_in(const double box[6], const double other[6])
+{
+  bool low = true, high = true;
+
+  for (int a = 0; a < 3; a++) {
+    low &= other[a] >= box[a] && other[a] < box[a + 3];
+    high &= other[a + 3] > box[a] && other[a + 3] <= box[a + 3];
+  }
+  return 0.5 * (low + high);
+}
+
+static double volume_of(const double box[6])
+{
+  return (box[3] - box[0]) * (box[4] - box[1]) * (box[5] - box[2]);
+}
+
+static double extent_of(const double box[6])
+{
+  return fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
+}
+
+/* Rounding of a pair's volume against the volume of the smaller cell, as room moments will see it, for a pair of some 40
+ * cones. */
+static bool is_slender(const estimate *e, const double source[6], double fill)
+{
+  const double extent = extent_of(source), reach = 4 * e->extent < extent ? e->extent : extent;
+
+  return reach * reach * (extent + e->extent + reach) > 1000 * fmin(fill * volume_of(source), e->volume);
+}
+
+static int meet_source(void *user, rm_lid item)
+{
+  estimate         *e    = user;
+  const rm_visitor *as   = &e->s->as[item];
+  const double      own  = corners_in(e->box, e->s->box[item]);
+
+  e->crossings += (1 - own - corners_in(e->s->box[item], e->box)) * sqrt((double)as->fill) *
+                  (is_slender(e, e->s->box[item], (double)as->fill) ? SLENDER : 1);
+  e->triangles += own * as->num_triangles;
+  e->visits++;
+  return 0;
+}
+
+static int64_t rounded(double work)
+{
+  return work < 0x1p40 ? (int64_t)ceil(work) : (int64_t)1 << 40;
+}
+
+/* The work of the small targets, but for giants. Not collective. */
+static void weigh_targets(const rm_tags *tags, const sources *s, int64_t *work)
+{
+  int64_t skip = 0, last = 0;
+  double  size = 0; /* of the box looked at last */
+
+  for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++) {
+    const rm_tag *tag = &tags->tag[REMAP_TARGET][k];
+    const double *box = tags->box[REMAP_TARGET][k];
+    estimate      e   = {.s = s, .box = box, .extent = extent_of(box), .volume = volume_of(box) * (double)tag->fill};
+
+    if (tag->is_giant) continue;
+    if (skip == 0 || volume_of(box) > 2 * size) {
+      (void)rm_boxtree_query(s->tree, (const double(*)[6])s->box, box, meet_source, &e);
+      last = rounded(CROSSING * fmax(e.crossings, 0) * sqrt((double)tag->fill) + TRIANGLE * e.triangles * (double)tag->fill);
+      skip = (int64_t)((double)e.visits * (1 - (double)tag->fill)) / MOST_VISITS;
+      size = volume_of(box);
+    } else {
+      skip--;
     }
-    d.key[d.num++] = tags->tag[REMAP_SOURCE][k].key;
-  }
-  *out = d;
-  return REMAP_OK;
-}
-
-static rm_lid num_below(const density *d, uint64_t key)
-{
-  rm_lid low = 0, high = d->num;
-
-  while (low < high) {
-    const rm_lid mid = low + (high - low) / 2;
-
-    if (d->key[mid] < key) low = mid + 1;
-    else high = mid;
-  }
-  return low;
-}
-
-/* Crossings that a target causes, and how many source cells it has to itself. */
-static void expect(const density *d, uint64_t key, const double box[6], double *crossings, double *own)
-{
-  double h[3], size = 0, mean[NUM_PRODUCTS];
-  rm_lid first = 0, end = 0;
-  int    level = 0;
-
-  *crossings = *own = 0;
-  for (int a = 0; a < 3; a++) h[a] = box[a + 3] - box[a], size = fmax(size, h[a]);
-  while (level < CURVE_LEVELS && ldexp(1, level) < size * d->steps) level++;
-  for (; level <= CURVE_LEVELS; level++) {
-    const uint64_t low = key >> (3 * level) << (3 * level);
-
-    first = num_below(d, low);
-    end   = num_below(d, low + (UINT64_C(1) << (3 * level)));
-    if (end - first >= FEW) break;
-  }
-  for (int m = 0; m < NUM_PRODUCTS; m++) mean[m] = d->sum[end][m] - d->sum[first][m];
-  if (!(mean[ALL_AXES] > 0)) return;
-  for (int m = 0; m < ALL_AXES; m++) {
-    double product = mean[m] / mean[ALL_AXES];
-
-    for (int a = 0; a < 3; a++)
-      if (!(m >> a & 1)) product *= h[a];
-    if (m == 0) *own = product;
-    else *crossings += product;
+    work[k] = last + TRIANGLE * (int64_t)tag->num_triangles;
   }
 }
 
@@ -191,8 +231,6 @@ static remap_status bring_faces(rm_arena *scratch, const rm_comm *comm, const rm
   return rm_comm_agree(comm, status, NULL);
 }
 
-/* ---- all of it ---------------------------------------------------------------------------------------------------- */
-
 static int count_one(void *user, rm_lid item)
 {
   (void)item;
@@ -207,54 +245,41 @@ static int is_target(void *user, rm_lid item)
   return giants->giant[item].side == REMAP_TARGET;
 }
 
-/* Whether a box meets a target that is a giant. */
-static bool meets_giant_target(rm_giants *giants, const double box[6])
+/* Add what giants of the other side cause at one side's small cells; f: the faces of those. Not collective. */
+static void add_giants(const rm_tags *tags, int side, rm_giants giants, const faces *f, int64_t *work)
 {
-  return rm_boxtree_query(giants->tree, giants->box, box, is_target, giants) != 0;
-}
-
-static int64_t rounded(double work)
-{
-  return work < 0x1p40 ? (int64_t)ceil(work) : (int64_t)1 << 40;
-}
-
-/* The work of the tags of one side; f: the faces of giants of the other side, NULL if there are no giants. Not collective. */
-static void weigh_side(const rm_tags *tags, int side, const density *d, const rm_giants *giants, const faces *f, int64_t *work)
-{
-  rm_giants known = *giants;
-
   for (rm_lid k = 0; k < tags->num[side]; k++) {
     const rm_tag *tag = &tags->tag[side][k];
     const double *box = tags->box[side][k];
-    double        crossings = 0, own = 0;
     int64_t       met = 0;
 
-    work[k] = 0;
     if (tag->is_giant) continue;
-    if (f) (void)rm_boxtree_query(f->tree, f->box, box, count_one, &met);
-    if (side == REMAP_TARGET) {
-      expect(d, tag->key, box, &crossings, &own);
-      work[k] = rounded(CROSSING * crossings + (own + 1) * TRIANGLE * tag->num_triangles + (crossings + own + 1) * PAIR);
-    } else if (f && meets_giant_target(&known, box)) {
-      work[k] = TRIANGLE * (int64_t)tag->num_triangles + PAIR;
-    }
+    (void)rm_boxtree_query(f->tree, f->box, box, count_one, &met);
+    if (side == REMAP_SOURCE && rm_boxtree_query(giants.tree, giants.box, box, is_target, &giants))
+      work[k] += TRIANGLE * (int64_t)tag->num_triangles;
     work[k] += GIANT_FACE * met;
   }
 }
 
-remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
-                           const rm_mesh *const mesh[2], const rm_tags *tags, const rm_giants *giants, int64_t *work[2])
-{
-  density      d = {.num = 0};
-  faces        of_giants[2];
-  remap_status status = find_density(scratch, zone_frame, tags, &d);
+/* ---- all of it ---------------------------------------------------------------------------------------------------- */
 
-  for (int side = 0; side < 2; side++) work[side] = rm_arena_alloc(arena, tags->num[side], sizeof *work[side]);
+remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
+                           const rm_tags *tags, const rm_giants *giants, int64_t *work[2])
+{
+  rm_visitors  visitors;
+  sources      s;
+  faces        of_giants;
+  remap_status status;
+
+  RM_TRY(rm_part_receive_visitors(scratch, comm, tags, &visitors));
+  status = gather_sources(scratch, tags, &visitors, &s);
+  for (int side = 0; side < 2; side++) work[side] = rm_arena_zero(arena, tags->num[side], sizeof *work[side]);
   if (status == REMAP_OK && !(work[0] && work[1])) status = REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
-  for (int side = 0; side < 2 && giants->num > 0; side++)
-    RM_TRY(bring_faces(scratch, comm, mesh[side], tags, giants, &of_giants[side]));
-  for (int side = 0; side < 2; side++)
-    weigh_side(tags, side, &d, giants, giants->num > 0 ? &of_giants[1 - side] : NULL, work[side]);
+  weigh_targets(tags, &s, work[REMAP_TARGET]);
+  for (int side = 0; side < 2 && giants->num > 0; side++) {
+    RM_TRY(bring_faces(scratch, comm, mesh[1 - side], tags, giants, &of_giants));
+    add_giants(tags, side, *giants, &of_giants, work[side]);
+  }
   return REMAP_OK;
 }

@@ -1,6 +1,6 @@
 /* zone -- two meshes in; out which of their cells can meet the other mesh at all (the overlap zone). What can never meet is
- * left behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh, and fewer where there
- * are very many ranks. O(n log B) time for n cells here and B boxes. */
+ * left behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh, and fewer
+ * where there are very many ranks. O(n log B) time for n cells here and B boxes. */
 #ifndef RM_ZONE_H
 #define RM_ZONE_H
 
@@ -8,7 +8,8 @@
 
 enum { RM_ZONE_BOXES = 64, RM_ZONE_ALL_BOXES = 1 << 16 };
 
-/* How many boxes a rank may have, for no more than RM_ZONE_ALL_BOXES or one per rank to be gathered: some megabytes on 10^5 ranks. */
+/* How many boxes a rank may have, for no more than RM_ZONE_ALL_BOXES or one per rank to be gathered: some megabytes on 10^5
+ * ranks. */
 static inline int rm_zone_boxes(int num_ranks)
 {
   const int most = RM_ZONE_ALL_BOXES / num_ranks;
@@ -45,8 +46,9 @@ int rm_boxtree_query_segment(const rm_boxtree *tree, const double (*item_box)[6]
 /* True if some item's own box meets `box`. O(log n) mostly. */
 bool rm_boxtree_meets(const rm_boxtree *tree, const double (*item_box)[6], const double box[6]);
 
-/* The boxes of at most `most` groups of neighbouring items that together hold all n boxes, in numbers that differ by a factor of two at
- * most: group is [most][6], *num_groups is 0 only if n is. Not collective. Working memory from scratch. O(n log most). */
+/* The boxes of at most `most` groups of neighbouring items that together hold all n boxes, in numbers that differ by a factor
+ * of two at most: group is [most][6], *num_groups is 0 only if n is. Not collective. Working memory from scratch. O(n log
+ * most). */
 remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], int *num_groups);
 
 /* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */

@@ -1,0 +1,137 @@
+/* crowd -- where the tags of other ranks are, coarsely, and what of this rank may meet them. Every rank knows the crowds of
+ * all: at most RM_ZONE_BOXES boxes per rank. Source tags that meet a crowd of another rank's targets are told there; those are
+ * mostly the neighbours along the Morton curve. O(n log B) time for n tags and B crowds; 64 bytes per visitor. */
+#include "part/part_private.h"
+
+#include <string.h>
+
+/* ---- crowds ------------------------------------------------------------------------------------------------------- */
+
+/* This rank's boxes of a side, around the tags that are no giants. Not collective. */
+static remap_status group(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowd *mine, int *num_mine)
+{
+  double (*box)[6], group[RM_ZONE_BOXES][6];
+  rm_lid num = 0;
+
+  RM_NEW(box, arena, tags->num[side]);
+  for (rm_lid k = 0; k < tags->num[side]; k++)
+    if (!tags->tag[side][k].is_giant) memcpy(box[num++], tags->box[side][k], sizeof *box);
+  RM_TRY(rm_box_groups(arena, num, (const double(*)[6])box, rm_zone_boxes(comm->size), group, num_mine));
+  for (int g = 0; g < *num_mine; g++) {
+    memcpy(mine[g].box, group[g], sizeof group[g]);
+    mine[g].rank = comm->rank;
+    mine[g].num  = (double)num / *num_mine;
+  }
+  return REMAP_OK;
+}
+
+/* A tree over the crowds. Not collective. */
+static remap_status grow_tree(rm_arena *arena, int64_t num, const rm_crowd *crowd, rm_crowds *out)
+{
+  double (*box)[6];
+
+  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(box, arena, num);
+  for (int64_t g = 0; g < num; g++) memcpy(box[g], crowd[g].box, sizeof *box);
+  *out = (rm_crowds){.num = (rm_lid)num, .crowd = crowd, .box = (const double(*)[6])box};
+  return rm_boxtree_build(arena, (rm_lid)num, out->box, &out->tree);
+}
+
+remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out)
+{
+  rm_crowd    *mine     = rm_arena_alloc(arena, RM_ZONE_BOXES, sizeof *mine);
+  int64_t     *offset   = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset);
+  int          num_mine = 0;
+  void        *all;
+  remap_status status = mine && offset ? group(arena, comm, tags, side, mine, &num_mine) : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(mine && offset);
+  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num_mine, sizeof *mine, offset, &all));
+  return rm_comm_agree(comm, grow_tree(arena, offset[comm->size], all, out), NULL);
+}
+
+/* ---- visitors ----------------------------------------------------------------------------------------------------- */
+
+/* What a source's query adds to: the ranks it has met. */
+typedef struct meeting {
+  const rm_crowds *crowds;
+  int64_t         *next; /* [comm->size] how many sources meet a rank, or where the next one goes */
+  rm_lid          *last; /* [comm->size] the tag that met a rank last                             */
+  rm_lid          *list; /* where the tags go, or NULL to count                                   */
+  rm_lid           tag;  /* the one that asks                                                     */
+} meeting;
+
+/* A source meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
+static int meet_rank(void *user, rm_lid item)
+{
+  meeting      *m    = user;
+  const int64_t rank = m->crowds->crowd[item].rank;
+
+  if (m->last[rank] == m->tag) return 0;
+  m->last[rank] = m->tag;
+  if (m->list) m->list[m->next[rank]] = m->tag;
+  m->next[rank]++;
+  return 0;
+}
+
+/* Every small source seated here asks which crowds of other ranks it meets. */
+static void meet_all(const rm_comm *comm, const rm_tags *tags, meeting *m)
+{
+  for (int r = 0; r < comm->size; r++) m->last[r] = -1;
+  for (rm_lid k = 0; k < tags->num[REMAP_SOURCE]; k++) {
+    if (tags->tag[REMAP_SOURCE][k].is_giant) continue;
+    m->tag              = k;
+    m->last[comm->rank] = k;
+    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, tags->box[REMAP_SOURCE][k], meet_rank, m);
+  }
+}
+
+/* The visitors to other ranks: counted in a first walk, listed in a second, so that the list needs no more room than it has
+ * entries; offset is [comm->size + 1]. Not collective. */
+static remap_status list_visitors(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_crowds *crowds,
+                                  int64_t *offset, rm_visitor **out, double (**box)[6])
+{
+  meeting m = {.crowds = crowds};
+  rm_lid *list;
+  int64_t num;
+
+  RM_NEW(m.last, arena, comm->size);
+  RM_NEW0(m.next, arena, comm->size);
+  meet_all(comm, tags, &m);
+  for (int r = 0; r < comm->size; r++) offset[r] = m.next[r];
+  num = rm_offsets(offset, comm->size);
+  RM_NEW(list, arena, num);
+  RM_NEW(*out, arena, num);
+  RM_NEW(*box, arena, num);
+  for (int r = 0; r < comm->size; r++) m.next[r] = offset[r];
+  m.list = list;
+  meet_all(comm, tags, &m);
+  for (int64_t k = 0; k < num; k++) {
+    const rm_tag *tag = &tags->tag[REMAP_SOURCE][list[k]];
+
+    (*out)[k] = (rm_visitor){tag->home_rank, tag->cell, tag->num_triangles, tag->fill};
+    memcpy((*box)[k], tags->box[REMAP_SOURCE][list[k]], sizeof **box);
+  }
+  return REMAP_OK;
+}
+
+remap_status rm_part_receive_visitors(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, rm_visitors *out)
+{
+  int64_t     *offset  = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset);
+  int64_t     *arrived = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *arrived);
+  rm_visitor  *visitor = NULL;
+  double     (*box)[6] = NULL;
+  void        *who, *where;
+  rm_crowds    crowds;
+  remap_status status;
+
+  RM_TRY(rm_part_crowds(arena, comm, tags, REMAP_TARGET, &crowds));
+  status = offset && arrived ? list_visitors(arena, comm, tags, &crowds, offset, &visitor, &box) : REMAP_NO_MEMORY;
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(offset && arrived);
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *visitor, offset, visitor, arrived, &who));
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *box, offset, box, arrived, &where));
+  *out = (rm_visitors){(rm_lid)arrived[comm->size], who, where};
+  return rm_comm_agree(comm, arrived[comm->size] > INT32_MAX ? REMAP_TOO_LARGE : REMAP_OK, NULL);
+}
