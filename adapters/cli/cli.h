@@ -5,6 +5,7 @@
  *   system.c    which fields move together, and how vectors turn
  *   masks.c     which cells give and which want values
  *   volumes.c   cell volumes of the solvers
+ *   priority.c  zones of SOURCE that overlap
  *   coverage.c  how much of the cells is covered
  *   check.c     --check
  *   supermesh.c --supermesh

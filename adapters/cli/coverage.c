@@ -29,14 +29,14 @@ static void insert(remap_partial_cell list[CLI_WORST], int *num, const remap_par
 /* This rank's cells. Volumes are summed as multiples of 2^-shift. */
 static void count(const cli_job *j, remap_side side, const cell_facts *facts, int shift, int64_t whole[4], cli_cover_row *row)
 {
-  const remap_mesh *mesh = rcgns_mesh(j->file[side]);
-  const uint8_t    *mask = j->mask[side];
+  const int64_t *global = cli_cells(j, side), n = cli_num_cells(j, side);
+  const uint8_t *mask = j->mask[side];
 
-  for (int64_t c = 0; c < mesh->num_cells; c++) {
+  for (int64_t c = 0; c < n; c++) {
     const remap_cover cover       = mask && !mask[c] ? REMAP_UNWANTED : facts->cover[c]; /* the library knows it of receivers */
     const double     *x           = facts->centre + 3 * c;
     const double      volume      = fabs(facts->volume[c]);
-    const remap_partial_cell cell = {mesh->cell_global[c], facts->fraction[c], volume, {x[0], x[1], x[2]}};
+    const remap_partial_cell cell = {global[c], facts->fraction[c], volume, {x[0], x[1], x[2]}};
 
     row->cells[cover]++;
     whole[cover] += llrint(ldexp(volume, shift));
@@ -81,7 +81,7 @@ static cli_exit find_side(cli_job *j, remap_side side, const cell_facts *facts, 
 cli_exit cli_coverage_find(cli_job *j, cli_failure *why)
 {
   for (int side = 0; side < 2; side++) {
-    const size_t n     = (size_t)rcgns_mesh(j->file[side])->num_cells + 1;
+    const size_t n     = (size_t)cli_num_cells(j, (remap_side)side) + 1;
     double      *d     = malloc(4 * n * sizeof *d);
     cell_facts   facts = {.volume = d, .centre = d + n, .cover = malloc(n * sizeof(remap_cover))};
     cli_exit     mine;

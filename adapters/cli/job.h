@@ -14,6 +14,9 @@
 /** The field that --coverage and --source-coverage write. */
 #define CLI_COVERAGE_FIELD "Coverage"
 
+/** SOURCE cut by --priority. Opaque. */
+typedef struct cli_cut cli_cut;
+
 /** Everything a step may need. Files and solutions of [remap_side]; the solution of the target holds the old values. */
 typedef struct cli_job {
   MPI_Comm       comm;
@@ -25,6 +28,7 @@ typedef struct cli_job {
   cli_progress  *progress;        /**< NULL but on a rank that speaks */
   rcgns_file    *file[2];
   rcgns_solution solution[2];
+  cli_cut       *cut; /**< NULL: SOURCE is as its file has it */
   remap_context *ctx;
 
   double           *fraction[2]; /**< [remap_side][cells of this rank] of their volume that is covered: psi and phi */
@@ -80,6 +84,26 @@ cli_exit cli_masks_read(cli_job *j, cli_failure *why);
 /** Read the solvers' cell volumes that were asked for: fills volume. Collective. Errors: USAGE (no such field), IO (not above
  *  0), INTERNAL. */
 cli_exit cli_volumes_read(cli_job *j, cli_failure *why);
+
+/** Refuse a --priority that names zones of neither file. Not collective; alike on all ranks. Errors: USAGE. */
+cli_exit cli_priority_check(const cli_job *j, cli_failure *why);
+
+/** Does --priority name zones of that side? Not collective. */
+bool cli_has_priority(const cli_job *j, remap_side side);
+
+/** Where --priority names zones of SOURCE, cut those of lower priority: sets cut, and the values and the mask become those of
+ *  what is visible. After all of SOURCE is read. Collective. Errors: USAGE, GEOMETRY (cells that cannot be cut), INTERNAL. */
+cli_exit cli_priority_cut(cli_job *j, cli_failure *why);
+
+/** End a cut and set *cut to NULL. Collective, and harmless on NULL. */
+void cli_cut_drop(cli_cut **cut);
+
+/** The cells of one side on this rank as the library has them: how many, and their global numbers. Not collective. */
+int64_t        cli_num_cells(const cli_job *j, remap_side side);
+const int64_t *cli_cells(const cli_job *j, remap_side side);
+
+/** Lend one side to the library, with the solver's volumes. Not collective. */
+void cli_set_mesh(const cli_job *j, remap_context *ctx, remap_side side);
 
 /** Give the library the masks, after remap_build. Collective. Errors: INTERNAL. */
 cli_exit cli_masks_apply(cli_job *j, cli_failure *why);

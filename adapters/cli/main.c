@@ -126,6 +126,7 @@ static cli_exit open_files(cli_job *j, cli_failure *why)
   cli_progress_set(j->progress, "reading meshes", -1);
   CLI_TRY(open_file(j, REMAP_SOURCE, why));
   CLI_TRY(open_file(j, REMAP_TARGET, why));
+  CLI_TRY(cli_priority_check(j, why));
   return check_outputs(j, why);
 }
 
@@ -157,19 +158,14 @@ static cli_exit build(cli_job *j, cli_failure *why)
   options.faces = j->options.faces;
   for (int k = 0; k < j->num_fields; k++) options.systems |= j->field[k].system;
   options.max_order             = j->options.check && j->options.transfer.order < 2 ? 2 : j->options.transfer.order;
-  options.zone_overlap_is_error = !j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET]; /* which tell zones apart */
+  options.zone_overlap_is_error = !j->options.mask[REMAP_SOURCE] && !j->options.mask[REMAP_TARGET] && !j->options.priority;
   options.log                   = j->options.verbose && !j->options.quiet ? print_log : NULL;
   options.progress              = hear_progress;
   options.user                  = j;
   status                        = remap_create(j->comm, &options, &j->ctx);
   if (status != REMAP_OK)
     return cli_fail(why, CLI_INTERNAL, "%s: %s", j->options.path[REMAP_SOURCE], remap_status_text(status));
-  for (int side = 0; side < 2; side++) {
-    remap_mesh mesh = *rcgns_mesh(j->file[side]);
-
-    mesh.cell_volume = j->volume[side];
-    remap_set_mesh(j->ctx, (remap_side)side, &mesh);
-  }
+  for (int side = 0; side < 2; side++) cli_set_mesh(j, j->ctx, (remap_side)side);
   CLI_TRY(cli_from_remap(j, remap_build(j->ctx), why));
   CLI_TRY(cli_from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why));
   CLI_TRY(cli_masks_apply(j, why));
@@ -312,6 +308,7 @@ static cli_exit run(cli_job *j, cli_failure *why)
   if (!j->options.check) CLI_TRY(cli_fields_read(j, why));
   CLI_TRY(cli_masks_read(j, why));
   CLI_TRY(cli_volumes_read(j, why));
+  CLI_TRY(cli_priority_cut(j, why));
   j->report.seconds_read = slowest(j, j->begin);
   MPI_Comm_size(j->comm, &j->report.stats.ranks);
   if (speaks) cli_report_meshes(stdout, &j->report, j->options.verbose);
@@ -335,6 +332,7 @@ static void end(cli_job *j)
   cli_progress_stop(j->progress);
   cli_report_discard(&j->report_file);
   remap_destroy(&j->ctx);
+  cli_cut_drop(&j->cut);
   for (int side = 0; side < 2; side++) rcgns_close(&j->file[side]);
   for (int i = 0; i < j->num_notes; i++) free(j->note[i]);
   free(j->note);

@@ -168,7 +168,7 @@ static cli_exit check_overlap(cli_job *j, cli_failure *why)
     mine = cli_fail(
         why, CLI_GEOMETRY,
         "%s: zones overlap where cells give values: cell %lld (counted from 1) of zone %s of %s is covered %.7g times: "
-        "give a --source-mask of fewer cells",
+        "give a --source-mask of fewer cells, or --priority",
         j->options.path[REMAP_SOURCE], (long long)(mesh->cell_global[cell] - zone->first_cell + 1), zone->name, info->path,
         fraction[cell]);
   }
@@ -177,7 +177,7 @@ static cli_exit check_overlap(cli_job *j, cli_failure *why)
 
 cli_exit cli_masks_settle(cli_job *j, cli_failure *why)
 {
-  if (has_masks(j)) CLI_TRY(check_overlap(j, why));
+  if (has_masks(j) || j->options.priority) CLI_TRY(check_overlap(j, why));
   return j->options.min_coverage > 0 ? set_masks(j, j->options.min_coverage, why) : CLI_DONE;
 }
 

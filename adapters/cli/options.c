@@ -49,6 +49,9 @@ cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
     "1+2")                                                                                                                    \
   X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                   \
     "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                          \
+  X(PRIORITY, 0, "priority", "BASE/ZONE,...", AT(priority),                                                                   \
+    "zones that overlap, the highest first, globs: what they hide of\nothers does not count; TARGET's cells get values one "  \
+    "by one")                                                                                                                 \
   X(SOURCE_VOLUME, 0, "source-volume", "FIELD", AT(volume[REMAP_SOURCE]),                                                     \
     "conserve what SOURCE's solver integrates, with its own cell volumes")                                                    \
   X(TARGET_VOLUME, 0, "target-volume", "FIELD", AT(volume[REMAP_TARGET]), "likewise what TARGET's solver integrates")         \

@@ -20,6 +20,7 @@ typedef struct cli_options {
   const char    *fields; /**< names and globs, comma separated */
   int            num_natures;
   const char    *nature[CLI_MAX_NATURES]; /**< [num_natures] lists of NAME=NATURE, comma separated */
+  const char    *priority;                /**< zones, BASE/ZONE or globs, comma separated, the highest first */
   const char    *mask[2];                 /**< [remap_side] FIELD or FIELD=CODES */
   const char    *volume[2];               /**< [remap_side] FIELD that holds the solver's cell volumes */
   const char    *base[2];                 /**< [remap_side] */

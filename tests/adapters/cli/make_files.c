@@ -24,6 +24,7 @@ typedef struct recipe {
   bool        is_surface;  /* quadrilaterals only */
   int         gas;         /* not 0: velocities, pressure, temperature, mass fractions and a gas model: see gas_bits */
   bool        masks;       /* a node Masks: Iblank, ChimeraCellType and others; Density is absurd in their holes */
+  bool        linear;      /* Tracer is a linear field, by the middles of cells */
   bool        hole_column; /* the holes are the first cells along x of the second zone instead */
   bool        bow_tie;     /* one cell that is turned inside out over half of its width: its volume nearly cancels */
   bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices;
@@ -60,6 +61,9 @@ static const recipe recipes[] = {
     {.name = "gas_lone", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY | GAS_LONE},
     {.name = "masked", .n = 4, .high = 1, .fields = 1, .masks = true},
     {.name = "overset", .n = 2, .high = 1, .fields = 1, .masks = true, .second_zone = .5, .hole_column = true},
+    {.name = "crossed", .n = 4, .high = 1, .fields = 1, .linear = true, .second_zone = .3},
+    {.name = "inside", .n = 3, .low = .05, .high = 1.05, .fields = 1, .linear = true},
+    {.name = "gas_crossed", .n = 4, .high = 1, .fields = 1, .second_zone = .3, .gas = GAS | GAS_DENSITY | GAS_RATIO},
     {.name = "wide", .n = 4, .low = -1, .high = 2, .fields = 1},
     {.name = "bow_tie", .n = 1, .high = 1, .bow_tie = true},
 };
@@ -198,6 +202,12 @@ static void add_solution(double zone, const recipe *r, bool is_second, const cha
   add_1d(solution, "Density", "DataArray_t", "R8", r->short_field ? count - 1 : count, x);
   for (int i = 0; i < count; i++) x[i] = r->nan_field && i == 2 ? NAN : cos(i);
   add_1d(solution, "MomentumX", "DataArray_t", "R8", count, x);
+  for (int i = 0; i < count && r->linear; i++) {
+    const double low = is_second ? r->second_zone : r->low, size = (r->high - r->low) / r->n;
+
+    x[i] = 1 + low + size * (i % r->n + .5) + 2 * size * (i / r->n % r->n) - size * (i / r->n / r->n);
+    x[i] += 2 * (r->low + .5 * size) - (r->low + .5 * size);
+  }
   add_1d(solution, "Tracer", "DataArray_t", "R8", count, x);
   add_1d(solution, "cellN", "DataArray_t", "I4", count, flag);
 }

@@ -44,17 +44,14 @@ quick "solution and step exclude each other" "--step" good.cgns mesh.cgns -o out
 for option in location=face order=4 order=two limiter=vanleer faces=center on-uncovered=blend on-partial=keep; do
   quick "--$option is not offered" "--${option%=*}: '${option#*=}'" good.cgns mesh.cgns -o out/result.cgns "--$option"
 done
-for option in priority cgns-version; do
-  quick "--$option is not offered" "'--$option'" good.cgns mesh.cgns -o out/result.cgns "--$option" x
-done
+quick "--cgns-version is not offered" "'--cgns-version'" good.cgns mesh.cgns -o out/result.cgns --cgns-version 4
 
 works 1 --help
 for option in fields nature order limiter faces on-uncovered on-partial location solution step output-solution source-base \
-  target-base scale transform source-volume target-volume gamma allow-nan keep-vectors check supermesh min-coverage coverage \
-  source-coverage source-mask target-mask report output quiet verbose version help; do
+  target-base scale transform priority source-volume target-volume gamma allow-nan keep-vectors check supermesh min-coverage \
+  coverage source-coverage source-mask target-mask report output quiet verbose version help; do
   grep -q -e "--$option" stdout || complain "--help does not say --$option"
 done
-if grep -E 'priority' stdout; then complain "--help offers too much"; fi
 [ "$(awk 'length > 128' stdout)" = "" ] || complain "--help is wide"
 hold "$wrong" "--help says every option, and no other"
 works 2 --version

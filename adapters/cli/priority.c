@@ -1,0 +1,485 @@
+/* priority -- zones of SOURCE that overlap, each point of space counted once: zones of higher priority keep their cells whole,
+ * those of lower priority give the part of theirs that no higher one hides.
+ *
+ * The zones form classes, one for each name of --priority and a last one of all others. Class by class, from the top, the cells
+ * less all that is visible already are made by remap_supermesh, as polyhedra that fit the cells they were cut at. Their values
+ * come from the cells they are parts of by a transfer of the order asked for, so they are conserved and as accurate. To the
+ * library the cells of the first class and the pieces of the others are the blocks of one mesh, and there are no zones that
+ * overlap. Zones of TARGET may overlap once one of them is named: their cells get values one by one.
+ *
+ * Cost: for each class but the first one supermesh and one overlay of it. */
+#include "job.h"
+
+#include <fnmatch.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The cells of one class: of the file, or pieces of them. */
+typedef struct part {
+  remap_mesh     mesh;
+  remap_context *maker;       /* of pieces: what holds the arrays; NULL: they are owned here */
+  int64_t       *cell_global; /* owned, as are these */
+  int64_t       *face_offset, *face_node, *face_owner, *face_neighbour;
+  int64_t       *place; /* cells of the file: [cells] place in arrays of fields as they were read */
+  uint8_t       *gives; /* [cells] the mask, NULL if there is none */
+} part;
+
+struct cli_cut {
+  int              num_classes, num_parts;
+  part            *part;         /* [num_parts], room for [num_classes] */
+  remap_mesh      *block;        /* [num_parts], likewise */
+  double         **values;       /* [num_parts] [fields][cells], while they are made */
+  int64_t         *first_global; /* [num_parts + 1] cells of part k are numbered from there on; of the first as in the file */
+  double          *in;           /* [fields][num_cells] */
+  int64_t          num_cells;
+  int64_t         *cell_global; /* [num_cells] */
+  const char     **zone_name;
+  int64_t         *zone_cell_offset;
+  rcgns_zone_info *zone;
+  rcgns_info       info; /* the file's, and one more zone for the pieces */
+};
+
+static int num_carried(const cli_job *j) { return j->num_fields + j->num_hidden; }
+
+/* ---- classes ------------------------------------------------------------------------------------------------------ */
+
+/* The number of the first item of the list that names the zone, from 0; how many there are if none does. */
+static int class_of(const char *list, const char *zone)
+{
+  int item = 0;
+
+  for (const char *from = list, *to; *from; from = *to ? to + 1 : to, item++) {
+    char pattern[256];
+
+    to = from + strcspn(from, ",");
+    if ((size_t)(to - from) >= sizeof pattern) continue;
+    memcpy(pattern, from, (size_t)(to - from));
+    pattern[to - from] = '\0';
+    if (!strcmp(pattern, zone) || fnmatch(pattern, zone, 0) == 0) return item;
+  }
+  return item;
+}
+
+bool cli_has_priority(const cli_job *j, remap_side side)
+{
+  const rcgns_info *info = rcgns_get_info(j->file[side]);
+
+  for (int64_t z = 0; j->options.priority && z < info->num_zones; z++)
+    if (class_of(j->options.priority, info->zone[z].name) < class_of(j->options.priority, "")) return true;
+  return false;
+}
+
+cli_exit cli_priority_check(const cli_job *j, cli_failure *why)
+{
+  const char *list = j->options.priority;
+
+  for (const char *from = list, *to; list && *from; from = *to ? to + 1 : to) {
+    char item[256] = "";
+    bool any       = false;
+
+    to = from + strcspn(from, ",");
+    if ((size_t)(to - from) < sizeof item) memcpy(item, from, (size_t)(to - from));
+    for (int side = 0; side < 2; side++) {
+      const rcgns_info *info = rcgns_get_info(j->file[side]);
+
+      for (int64_t z = 0; z < info->num_zones; z++) any = any || class_of(item, info->zone[z].name) == 0;
+    }
+    if (!any || !*item)
+      return cli_fail(why, CLI_USAGE, "--priority: neither %s nor %s has a zone '%.200s': give BASE/ZONE,... such as %s",
+                      j->options.path[REMAP_SOURCE], j->options.path[REMAP_TARGET], item,
+                      rcgns_get_info(j->file[REMAP_SOURCE])->zone[0].name);
+  }
+  return CLI_DONE;
+}
+
+/* ---- cells of the file -------------------------------------------------------------------------------------------- */
+
+static bool make_part_room(part *p, int64_t cells, int64_t faces, int64_t corners)
+{
+  p->cell_global    = malloc(((size_t)cells + 1) * sizeof(int64_t));
+  p->place          = malloc(((size_t)cells + 1) * sizeof(int64_t));
+  p->face_offset    = malloc(((size_t)faces + 1) * sizeof(int64_t));
+  p->face_node      = malloc(((size_t)corners + 1) * sizeof(int64_t));
+  p->face_owner     = malloc(((size_t)faces + 1) * sizeof(int64_t));
+  p->face_neighbour = malloc(((size_t)faces + 1) * sizeof(int64_t));
+  return p->cell_global && p->place && p->face_offset && p->face_node && p->face_owner && p->face_neighbour;
+}
+
+/* The cells of a mesh whose class is k; nodes are shared with it. number has room for [cells]. */
+static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int64_t *number, part *p)
+{
+  int64_t cells = 0, faces = 0, corners = 0;
+
+  for (int64_t c = 0; c < m->num_cells; c++) number[c] = class_of_cell[c] == k ? cells++ : -1;
+  for (int64_t f = 0; f < m->num_faces; f++)
+    if (number[m->face_owner[f]] >= 0) faces++, corners += m->face_offset[f + 1] - m->face_offset[f];
+  if (!make_part_room(p, cells, faces, corners)) return false;
+  for (int64_t c = 0; c < m->num_cells; c++)
+    if (number[c] >= 0) p->cell_global[number[c]] = m->cell_global[c], p->place[number[c]] = c;
+  faces = corners = p->face_offset[0] = 0;
+  for (int64_t f = 0; f < m->num_faces; f++) {
+    const int64_t n = m->face_offset[f + 1] - m->face_offset[f];
+
+    if (number[m->face_owner[f]] < 0) continue;
+    memcpy(p->face_node + corners, m->face_node + m->face_offset[f], (size_t)n * sizeof(int64_t));
+    corners += n;
+    p->face_owner[faces]     = number[m->face_owner[f]];
+    p->face_neighbour[faces] = m->face_neighbour[f] < 0 ? -1 : number[m->face_neighbour[f]]; /* of one zone, hence one class */
+    p->face_offset[++faces]  = corners;
+  }
+  p->mesh                = *m;
+  p->mesh.num_cells      = cells;
+  p->mesh.num_faces      = faces;
+  p->mesh.cell_global    = p->cell_global;
+  p->mesh.face_offset    = p->face_offset;
+  p->mesh.face_node      = p->face_node;
+  p->mesh.face_owner     = p->face_owner;
+  p->mesh.face_neighbour = p->face_neighbour;
+  return true;
+}
+
+static void drop_part(part *p)
+{
+  remap_destroy(&p->maker);
+  free(p->cell_global);
+  free(p->place);
+  free(p->face_offset);
+  free(p->face_node);
+  free(p->face_owner);
+  free(p->face_neighbour);
+  free(p->gives);
+}
+
+/* ---- pieces ------------------------------------------------------------------------------------------------------- */
+
+static cli_exit from_cut(const cli_job *j, remap_context *ctx, remap_status status, cli_failure *why)
+{
+  if (status == REMAP_OK) return CLI_DONE;
+  return cli_fail(why, status == REMAP_BAD_MESH || status == REMAP_INCONSISTENT ? CLI_GEOMETRY : CLI_INTERNAL,
+                  "%s: its zones cannot be cut by --priority: %s", j->options.path[REMAP_SOURCE],
+                  *remap_message(ctx) ? remap_message(ctx) : remap_status_text(status));
+}
+
+/* A context for steps of the cut. Collective. */
+static cli_exit new_context(cli_job *j, remap_context **out, cli_failure *why)
+{
+  remap_options options;
+  remap_status  status;
+
+  remap_options_default(&options);
+  options.faces     = j->options.faces;
+  options.max_order = j->options.transfer.order;
+  for (int k = 0; k < num_carried(j); k++) options.systems |= j->field[k].system;
+  status = remap_create(j->comm, &options, out);
+  return status == REMAP_OK ? CLI_DONE
+                            : cli_fail(why, CLI_INTERNAL, "%s: %s", j->options.path[REMAP_SOURCE], remap_status_text(status));
+}
+
+/* The mask of pieces is that of the cells they are parts of. Collective. */
+static cli_exit cut_mask(cli_job *j, const part *whole, part *piece, cli_failure *why)
+{
+  const size_t n = (size_t)whole->mesh.num_cells, m = (size_t)piece->mesh.num_cells;
+  double      *in = NULL, *out = NULL;
+  cli_exit     mine;
+
+  if (!j->options.mask[REMAP_SOURCE]) return CLI_DONE;
+  in           = malloc((n + 1) * sizeof *in);
+  out          = malloc((m + 1) * sizeof *out);
+  piece->gives = malloc(m + 1);
+  mine         = cli_agree(j, in && out && piece->gives ? CLI_DONE : cli_no_memory(why), why);
+  if (mine == CLI_DONE) {
+    for (size_t c = 0; c < n; c++) in[c] = whole->gives[c];
+    mine = from_cut(j, piece->maker, remap_supermesh_cell_values(piece->maker, REMAP_SOURCE, in, 0, out), why);
+  }
+  for (size_t c = 0; c < m && mine == CLI_DONE; c++) piece->gives[c] = out[c] != 0;
+  free(in);
+  free(out);
+  return mine;
+}
+
+/* The cells less what is visible of the classes above, whose blocks are given. Collective. */
+static cli_exit cut_cells(cli_job *j, const part *whole, int num_above, const remap_mesh *above, int64_t first_global,
+                          part *piece, int64_t *num_global, cli_failure *why)
+{
+  remap_supermesh_options options;
+  remap_supermesh_view    view;
+  cli_exit                mine;
+
+  CLI_TRY(new_context(j, &piece->maker, why));
+  remap_set_mesh(piece->maker, REMAP_SOURCE, &whole->mesh);
+  remap_set_blocks(piece->maker, REMAP_TARGET, num_above, above);
+  remap_supermesh_options_default(&options);
+  options.keep = REMAP_IN_SOURCE;
+  CLI_TRY(from_cut(j, piece->maker, remap_supermesh(piece->maker, &options, &view), why));
+  piece->cell_global = malloc(((size_t)view.num_cells + 1) * sizeof(int64_t));
+  mine               = cli_agree(j, piece->cell_global ? CLI_DONE : cli_no_memory(why), why);
+  CLI_TRY(mine);
+  for (int64_t c = 0; c < view.num_cells; c++) piece->cell_global[c] = first_global + view.cell_global[c];
+  *num_global = view.global_cells;
+  piece->mesh = (remap_mesh){.num_nodes        = view.num_nodes,
+                             .num_faces        = view.num_faces,
+                             .num_cells        = view.num_cells,
+                             .node_xyz         = view.node_xyz,
+                             .face_offset      = view.face_offset,
+                             .face_node32      = view.face_node,
+                             .face_owner32     = view.face_owner,
+                             .face_neighbour32 = view.face_neighbour,
+                             .cell_global      = piece->cell_global,
+                             .name             = whole->mesh.name};
+  return cut_mask(j, whole, piece, why);
+}
+
+/* ---- values ------------------------------------------------------------------------------------------------------- */
+
+/* All fields from whole cells to their pieces; in and out are [fields][cells] of them. Collective. */
+static cli_exit carry(cli_job *j, const part *whole, const part *piece, const double *in, double *out, cli_failure *why)
+{
+  const remap_masks masks = {.gives = {whole->gives, NULL}, .wants = {NULL, piece->gives}};
+  remap_transfer    how   = j->options.transfer;
+  remap_field_desc *f     = malloc(((size_t)num_carried(j) + 1) * sizeof *f);
+  remap_context    *ctx   = NULL;
+  cli_exit          mine  = cli_agree(j, f ? CLI_DONE : cli_no_memory(why), why);
+
+  if (mine == CLI_DONE) mine = new_context(j, &ctx, why);
+  if (mine == CLI_DONE) {
+    remap_set_mesh(ctx, REMAP_SOURCE, &whole->mesh);
+    remap_set_mesh(ctx, REMAP_TARGET, &piece->mesh);
+    mine = from_cut(j, ctx, remap_build(ctx), why);
+  }
+  if (mine == CLI_DONE && j->options.mask[REMAP_SOURCE]) mine = from_cut(j, ctx, remap_set_masks(ctx, &masks), why);
+  if (mine == CLI_DONE) {
+    for (int k = 0; k < num_carried(j); k++) {
+      f[k]         = j->field[k];
+      f[k].in      = in + (int64_t)k * whole->mesh.num_cells;
+      f[k].out     = out + (int64_t)k * piece->mesh.num_cells;
+      f[k].has_old = 0;
+    }
+    how.on_uncovered = REMAP_UNCOVERED_KEEP; /* by rounding at most */
+    how.on_partial   = REMAP_PARTIAL_NORMALISE;
+    how.rotation     = NULL; /* once is enough */
+    how.allow_nan    = j->options.allow_nan;
+    mine             = from_cut(j, ctx, remap_field(ctx, REMAP_FORWARD, &how, num_carried(j), f, NULL), why);
+  }
+  remap_destroy(&ctx);
+  free(f);
+  return mine;
+}
+
+/* The values of a class as they were read, [fields][cells]; NULL: no memory. */
+static double *take_values(const cli_job *j, const part *p)
+{
+  const int64_t n   = p->mesh.num_cells;
+  double       *all = malloc(((size_t)(n * num_carried(j)) + 1) * sizeof *all);
+
+  for (int k = 0; all && k < num_carried(j); k++)
+    for (int64_t c = 0; c < n; c++) all[k * n + c] = j->field[k].in[p->place[c]];
+  return all;
+}
+
+/* ---- the whole ---------------------------------------------------------------------------------------------------- */
+
+/* One class into the next part: its cells, cut unless it is the first, and their values. Collective. */
+static cli_exit add_class(cli_job *j, cli_cut *cut, const int *class_of_cell, int k, int64_t *number, cli_failure *why)
+{
+  const remap_mesh *m     = rcgns_mesh(j->file[REMAP_SOURCE]);
+  const uint8_t    *mask  = j->mask[REMAP_SOURCE];
+  const int         p     = cut->num_parts;
+  part              whole = {.maker = NULL}, *to = &cut->part[p];
+  bool              ok  = take_cells(m, class_of_cell, k, number, &whole);
+  double           *in  = ok ? take_values(j, &whole) : NULL;
+  int64_t           num = 0;
+  cli_exit          mine;
+
+  if (ok && mask) whole.gives = malloc((size_t)whole.mesh.num_cells + 1);
+  for (int64_t c = 0; ok && whole.gives && c < whole.mesh.num_cells; c++) whole.gives[c] = mask[whole.place[c]];
+  mine = cli_agree(j, in && (!mask || whole.gives) ? CLI_DONE : cli_no_memory(why), why);
+  cut->num_parts++;
+  if (p == 0) {
+    *to            = whole;
+    cut->values[0] = in;
+    return mine;
+  }
+  if (mine == CLI_DONE) mine = cut_cells(j, &whole, p, cut->block, cut->first_global[p], to, &num, why);
+  cut->first_global[p + 1] = cut->first_global[p] + num;
+  if (mine == CLI_DONE) {
+    cut->values[p] = malloc(((size_t)(to->mesh.num_cells * num_carried(j)) + 1) * sizeof(double));
+    mine           = cli_agree(j, cut->values[p] ? CLI_DONE : cli_no_memory(why), why);
+  }
+  if (mine == CLI_DONE) mine = carry(j, &whole, to, in, cut->values[p], why);
+  drop_part(&whole);
+  free(in);
+  return mine;
+}
+
+/* All classes that have cells somewhere. Collective. */
+static cli_exit add_classes(cli_job *j, cli_cut *cut, cli_failure *why)
+{
+  const rcgns_info *info   = rcgns_get_info(j->file[REMAP_SOURCE]);
+  const remap_mesh *m      = rcgns_mesh(j->file[REMAP_SOURCE]);
+  int              *klass  = malloc(((size_t)m->num_cells + 1) * sizeof *klass);
+  int64_t          *number = malloc(((size_t)m->num_cells + 1) * sizeof *number);
+  cli_exit          mine   = cli_agree(j, klass && number ? CLI_DONE : cli_no_memory(why), why);
+
+  for (int64_t c = 0; c < m->num_cells && mine == CLI_DONE; c++)
+    klass[c] = class_of(j->options.priority, cli_zone_of(info, m->cell_global[c])->name);
+  cut->first_global[0] = 0;
+  cut->first_global[1] = info->num_cells;
+  for (int k = 0; k < cut->num_classes && mine == CLI_DONE; k++) {
+    bool any = false;
+
+    for (int64_t z = 0; z < info->num_zones; z++) any = any || class_of(j->options.priority, info->zone[z].name) == k;
+    if (!any) continue;
+    mine = add_class(j, cut, klass, k, number, why);
+    if (mine == CLI_DONE) {
+      cut->block[cut->num_parts - 1]           = cut->part[cut->num_parts - 1].mesh;
+      cut->block[cut->num_parts - 1].num_zones = 0; /* until the numbers of pieces are all known */
+    }
+  }
+  free(klass);
+  free(number);
+  return mine;
+}
+
+/* The parts one behind the other: cells, values, mask. */
+static bool join_parts(cli_job *j, cli_cut *cut)
+{
+  int64_t  at    = 0;
+  uint8_t *gives = NULL;
+
+  for (int p = 0; p < cut->num_parts; p++) cut->num_cells += cut->part[p].mesh.num_cells;
+  cut->in          = malloc(((size_t)(cut->num_cells * num_carried(j)) + 1) * sizeof *cut->in);
+  cut->cell_global = malloc(((size_t)cut->num_cells + 1) * sizeof *cut->cell_global);
+  if (j->mask[REMAP_SOURCE]) gives = malloc((size_t)cut->num_cells + 1);
+  if (!cut->in || !cut->cell_global || (j->mask[REMAP_SOURCE] && !gives)) {
+    free(gives);
+    return false;
+  }
+  for (int p = 0; p < cut->num_parts; at += cut->part[p++].mesh.num_cells) {
+    const size_t n = (size_t)cut->part[p].mesh.num_cells;
+
+    memcpy(cut->cell_global + at, cut->part[p].cell_global, n * sizeof(int64_t));
+    if (gives) memcpy(gives + at, cut->part[p].gives, n);
+    for (int k = 0; k < num_carried(j); k++)
+      memcpy(cut->in + k * cut->num_cells + at, cut->values[p] + (size_t)k * n, n * sizeof(double));
+  }
+  for (int k = 0; k < num_carried(j); k++) j->field[k].in = cut->in + k * cut->num_cells;
+  if (gives) {
+    free(j->mask[REMAP_SOURCE]);
+    j->mask[REMAP_SOURCE] = gives;
+  }
+  return true;
+}
+
+/* The zones of the file and one for the pieces, for messages and the report. */
+static bool name_zones(cli_job *j, cli_cut *cut)
+{
+  const rcgns_info *info = rcgns_get_info(j->file[REMAP_SOURCE]);
+  const size_t      n    = (size_t)info->num_zones;
+  const int64_t     last = cut->first_global[cut->num_parts];
+
+  cut->zone             = malloc((n + 1) * sizeof *cut->zone);
+  cut->zone_name        = malloc((n + 1) * sizeof *cut->zone_name);
+  cut->zone_cell_offset = malloc((n + 2) * sizeof *cut->zone_cell_offset);
+  if (!cut->zone || !cut->zone_name || !cut->zone_cell_offset) return false;
+  memcpy(cut->zone, info->zone, n * sizeof *cut->zone);
+  cut->zone[n] = (rcgns_zone_info){
+      .name = "(pieces of zones of lower priority)", .num_cells = last - info->num_cells, .first_cell = info->num_cells};
+  for (size_t z = 0; z <= n; z++) {
+    cut->zone_name[z]        = cut->zone[z].name;
+    cut->zone_cell_offset[z] = cut->zone[z].first_cell;
+  }
+  cut->zone_cell_offset[n + 1]   = last;
+  cut->info                      = *info;
+  cut->info.zone                 = cut->zone;
+  cut->info.num_zones            = info->num_zones + 1;
+  cut->block[0].num_zones        = cut->info.num_zones;
+  cut->block[0].zone_name        = cut->zone_name;
+  cut->block[0].zone_cell_offset = cut->zone_cell_offset;
+  return true;
+}
+
+static cli_exit refuse_others(const cli_job *j, cli_failure *why)
+{
+  const char *other = j->options.check                  ? "--check"
+                      : j->options.source_coverage      ? "--source-coverage"
+                      : j->options.volume[REMAP_SOURCE] ? "--source-volume"
+                      : j->options.supermesh            ? "--supermesh"
+                                                        : NULL;
+
+  return other
+             ? cli_fail(why, CLI_USAGE, "%s knows no pieces of cells: leave it or the zones of SOURCE in --priority out", other)
+             : CLI_DONE;
+}
+
+cli_exit cli_priority_cut(cli_job *j, cli_failure *why)
+{
+  cli_cut *cut;
+  size_t   n;
+  cli_exit mine;
+
+  if (!cli_has_priority(j, REMAP_SOURCE)) return CLI_DONE;
+  CLI_TRY(refuse_others(j, why));
+  cli_progress_set(j->progress, "cutting zones", -1);
+  n   = (size_t)class_of(j->options.priority, "") + 1;
+  cut = j->cut = calloc(1, sizeof *cut);
+  if (cut) {
+    cut->num_classes  = (int)n;
+    cut->part         = calloc(n, sizeof *cut->part);
+    cut->block        = calloc(n, sizeof *cut->block);
+    cut->values       = calloc(n, sizeof *cut->values);
+    cut->first_global = calloc(n + 1, sizeof *cut->first_global);
+  }
+  mine = cut && cut->part && cut->block && cut->values && cut->first_global ? CLI_DONE : cli_no_memory(why);
+  CLI_TRY(cli_agree(j, mine, why));
+  CLI_TRY(add_classes(j, cut, why));
+  CLI_TRY(cli_agree(j, join_parts(j, cut) && name_zones(j, cut) ? CLI_DONE : cli_no_memory(why), why));
+  j->report.info[REMAP_SOURCE] = &cut->info;
+  cli_note(j, "%s: %lld pieces of cells of lower priority are visible", cut->info.path,
+           (long long)(cut->first_global[cut->num_parts] - cut->info.num_cells));
+  return CLI_DONE;
+}
+
+void cli_cut_drop(cli_cut **address)
+{
+  cli_cut *cut = *address;
+
+  *address = NULL;
+  if (!cut) return;
+  for (int p = 0; p < cut->num_parts; p++) {
+    drop_part(&cut->part[p]);
+    free(cut->values[p]);
+  }
+  free(cut->part);
+  free(cut->block);
+  free(cut->values);
+  free(cut->first_global);
+  free(cut->in);
+  free(cut->cell_global);
+  free(cut->zone);
+  free(cut->zone_name);
+  free(cut->zone_cell_offset);
+  free(cut);
+}
+
+/* ---- cells of a side ---------------------------------------------------------------------------------------------- */
+
+int64_t cli_num_cells(const cli_job *j, remap_side side)
+{
+  return j->cut && side == REMAP_SOURCE ? j->cut->num_cells : rcgns_mesh(j->file[side])->num_cells;
+}
+
+const int64_t *cli_cells(const cli_job *j, remap_side side)
+{
+  return j->cut && side == REMAP_SOURCE ? j->cut->cell_global : rcgns_mesh(j->file[side])->cell_global;
+}
+
+void cli_set_mesh(const cli_job *j, remap_context *ctx, remap_side side)
+{
+  remap_mesh mesh = *rcgns_mesh(j->file[side]);
+
+  mesh.cell_volume = j->volume[side];
+  if (j->cut && side == REMAP_SOURCE)
+    remap_set_blocks(ctx, side, j->cut->num_parts, j->cut->block);
+  else
+    remap_set_mesh(ctx, side, &mesh);
+}
