@@ -26,23 +26,35 @@ static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
   return rm_comm_max_f64(&ctx->comm, magnitude, 2);
 }
 
-/* What happens on this rank alone. */
-static remap_status overlay_here(remap_context *ctx, rm_arena *arena, const double magnitude[2],
-                                 const rm_overlay **overlay, const rm_moments **moments, rm_zone_overlap zones[2],
-                                 rm_reason *reason)
+/* Crossings, segments and the pairs they make, which stay in arena; the overlay itself ends here. Not collective. */
+static remap_status overlay_pairs(remap_context *ctx, rm_arena *arena, int64_t *crossings, const rm_moments **moments, rm_reason *reason)
 {
   const rm_progress progress = {ctx->options.progress, ctx->options.user};
   const rm_part    *part     = &ctx->place.part;
+  rm_arena         *own      = rm_arena_new();
+  const rm_overlay *overlay;
+  remap_status      status = own ? REMAP_OK : REMAP_NO_MEMORY;
 
+  if (status == REMAP_OK) status = rm_overlay_build(own, ctx->place.trimesh, part, &progress, &overlay, reason);
+  if (status == REMAP_OK) status = rm_moments_build(arena, part, overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments);
+  if (status == REMAP_OK) *crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
+  rm_arena_drop(own);
+  return status;
+}
+
+/* What happens on this rank alone. keeps: the next overlay may use the triangles. */
+static remap_status overlay_here(remap_context *ctx, bool keeps, rm_arena *arena, const double magnitude[2], int64_t *crossings,
+                                 const rm_moments **moments, rm_zone_overlap zones[2], rm_reason *reason)
+{
   for (int side = 0; side < 2; side++) {
     RM_TRY(rm_context_triangulate(ctx, side));
-    RM_TRY(rm_zone_overlap_find(&ctx->frame, &part->piece[side], ctx->place.trimesh[side], ctx->options.faces,
+    RM_TRY(rm_zone_overlap_find(&ctx->frame, &ctx->place.part.piece[side], ctx->place.trimesh[side], ctx->options.faces,
                                 ctx->labels[side].num_zones, ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side],
                                 reason));
   }
   RM_TRY(rm_context_progress(ctx, "triangulation", 1));
-  RM_TRY(rm_overlay_build(arena, ctx->place.trimesh, part, &progress, overlay, reason));
-  RM_TRY(rm_moments_build(arena, part, *overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments));
+  RM_TRY(overlay_pairs(ctx, arena, crossings, moments, reason));
+  for (int side = 0; side < 2 && !keeps; side++) rm_context_drop_triangles(ctx, side);
   return rm_context_progress(ctx, "volumes and moments", 1);
 }
 
@@ -107,9 +119,9 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
 }
 
 /* The overlay of meshes that move or are new, which are read again, and of others, which are as they were. Collective. */
-static remap_status build(remap_context *ctx, const bool moves[2], rm_arena *passing, rm_reason *reason)
+static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, rm_arena *passing, rm_reason *reason)
 {
-  const rm_overlay *overlay = NULL;
+  int64_t           crossings = 0;
   const rm_moments *moments = NULL;
   rm_zone_overlap   zones[2];
   bool              is_new[2] = {moves[0], moves[1]};
@@ -120,9 +132,8 @@ static remap_status build(remap_context *ctx, const bool moves[2], rm_arena *pas
   RM_TRY(find_magnitudes(ctx, magnitude));
   ctx->stats.seconds_partition = rm_seconds() - start;
   start                        = rm_seconds();
-  RM_TRY(stage(ctx, overlay_here(ctx, passing, magnitude, &overlay, &moments, zones, reason), reason));
+  RM_TRY(stage(ctx, overlay_here(ctx, keeps, passing, magnitude, &crossings, &moments, zones, reason), reason));
   RM_TRY(worst_zone_overlap(ctx, zones, reason));
-  const int64_t crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
   RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->place.part, moments, &ctx->mapping, reason));
   ctx->stats.seconds_overlay = rm_seconds() - start;
   return fill_stats(ctx, crossings);
@@ -145,7 +156,7 @@ static remap_status build_anew(remap_context *ctx, const bool moves[2], bool kee
   memset(&ctx->stats, 0, sizeof ctx->stats);
   ctx->seconds_transfer = 0;
   status                = stage(ctx, ctx->arena && passing ? REMAP_OK : REMAP_NO_MEMORY, reason);
-  if (status == REMAP_OK) status = build(ctx, moves, passing, reason);
+  if (status == REMAP_OK) status = build(ctx, moves, keeps, passing, reason);
   rm_arena_drop(passing);
   ctx->is_built = status == REMAP_OK;
   if (!ctx->is_built || !keeps) rm_context_drop_place(ctx);

@@ -17,7 +17,8 @@ typedef struct rm_labels {
 /* Where the cells of both meshes are overlaid. */
 typedef struct rm_place {
   rm_arena         *arena;          /* of routes and boxes                                               */
-  rm_arena         *piece_arena[2]; /* [side] of the piece and its triangles                             */
+  rm_arena         *piece_arena[2]; /* [side] of the piece                                               */
+  rm_arena         *triangle_arena[2]; /* [side] of its triangles                                        */
   const rm_routes  *routes;         /* NULL: none are chosen                                             */
   rm_part           part;           /* what came along them                                              */
   const rm_trimesh *trimesh[2];     /* [side] of the piece; NULL until made                              */
@@ -122,6 +123,9 @@ remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena
 
 /* Triangulate what is there of one side, unless that is done already. Not collective. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_triangulate(remap_context *ctx, int side);
+
+/* Give a side's triangles back. Not collective. */
+void rm_context_drop_triangles(remap_context *ctx, int side);
 
 /* Forget where cells are overlaid. Not collective. */
 void rm_context_drop_place(remap_context *ctx);

@@ -17,10 +17,20 @@
 
 enum { MOVES_AHEAD = 6 }; /* that the margin allows for */
 
+void rm_context_drop_triangles(remap_context *ctx, int side)
+{
+  rm_arena_drop(ctx->place.triangle_arena[side]);
+  ctx->place.triangle_arena[side] = NULL;
+  ctx->place.trimesh[side]        = NULL;
+}
+
 void rm_context_drop_place(remap_context *ctx)
 {
   rm_arena_drop(ctx->place.arena);
-  for (int side = 0; side < 2; side++) rm_arena_drop(ctx->place.piece_arena[side]);
+  for (int side = 0; side < 2; side++) {
+    rm_context_drop_triangles(ctx, side);
+    rm_arena_drop(ctx->place.piece_arena[side]);
+  }
   memset(&ctx->place, 0, sizeof ctx->place);
 }
 
@@ -116,7 +126,7 @@ static remap_status send_piece(remap_context *ctx, int side, rm_reason *reason)
 
   rm_arena_drop(place->piece_arena[side]);
   place->piece_arena[side] = rm_arena_new();
-  place->trimesh[side]     = NULL;
+  rm_context_drop_triangles(ctx, side);
   RM_TRY(rm_comm_agree(&ctx->comm, place->piece_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   return rm_part_send(place->piece_arena[side], &ctx->comm, ctx->mesh[side], place->routes, &place->part.piece[side], reason);
 }
@@ -130,7 +140,7 @@ remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena
   if (!hold) RM_TRY(choose_routes(ctx, margin, passing, reason));
   if (hold && memcmp(&ctx->place.frame, &ctx->frame, sizeof ctx->frame)) { /* triangles are in order along its curve */
     ctx->place.frame = ctx->frame;
-    for (int side = 0; side < 2; side++) ctx->place.trimesh[side] = NULL;
+    for (int side = 0; side < 2; side++) rm_context_drop_triangles(ctx, side);
   }
   for (int side = 0; side < 2; side++)
     if (!hold || is_new[side]) RM_TRY(send_piece(ctx, side, reason));
@@ -143,5 +153,8 @@ remap_status rm_context_triangulate(remap_context *ctx, int side)
   rm_place *place = &ctx->place;
 
   if (place->trimesh[side]) return REMAP_OK;
-  return rm_trimesh_build(place->piece_arena[side], &ctx->frame, &place->part.piece[side], ctx->options.faces, &place->trimesh[side]);
+  rm_context_drop_triangles(ctx, side);
+  place->triangle_arena[side] = rm_arena_new();
+  if (!place->triangle_arena[side]) return REMAP_NO_MEMORY;
+  return rm_trimesh_build(place->triangle_arena[side], &ctx->frame, &place->part.piece[side], ctx->options.faces, &place->trimesh[side]);
 }

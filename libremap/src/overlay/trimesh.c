@@ -218,22 +218,34 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   return REMAP_OK;
 }
 
+/* The end of the copies of triangle i; *joined if they are two on opposite sides. */
+static inline int64_t copies_end(const corner_triple *triple, int64_t i, int64_t num, bool *joined)
+{
+  int64_t k = i + 1;
+
+  while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
+  *joined = k == i + 2 && triple[i].right != triple[i + 1].right;
+  return k;
+}
+
 /* Join the two copies of a triangle that lie on opposite sides; any other number of copies stays apart, each a skin. */
 static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
 {
   rm_lid (*triangle)[3], (*side)[2], (*face)[2];
   uint8_t *skin;
+  int64_t  after = num;
   rm_lid   count = 0;
+  bool     joined;
 
-  RM_NEW(triangle, arena, num);
-  RM_NEW(side, arena, num);
-  RM_NEW(skin, arena, num);
-  RM_NEW(face, arena, num);
+  for (int64_t i = 0; i < num; after -= joined) i = copies_end(triple, i, num, &joined);
+  RM_NEW(triangle, arena, after);
+  RM_NEW(side, arena, after);
+  RM_NEW(skin, arena, after);
+  RM_NEW(face, arena, after);
   for (int64_t i = 0; i < num;) {
-    int64_t k = i + 1;
-    while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
-    const bool joined = k == i + 2 && triple[i].right != triple[i + 1].right;
-    for (; i < k; i += 1 + joined) {
+    const int64_t end = copies_end(triple, i, num, &joined);
+
+    for (; i < end; i += 1 + joined) {
       memcpy(triangle[count], triple[i].v, sizeof *triangle);
       face[count][0] = face[count][1] = side[count][0] = side[count][1] = RM_OUTSIDE;
       for (int h = 0; h <= joined; h++) {
@@ -263,27 +275,44 @@ static void triangle_normal(const rm_trimesh *m, rm_lid t, double n[3])
 
 /* ---- edges ------------------------------------------------------------------------------------------------------- */
 
-static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+/* The half edges of all triangles as words: upper vertex, then 4 * triangle + h. Those of a lower vertex stand from offset[vertex] on
+ * and ascend, so that the triangles of an edge do too. num_edges: how many edges they make. */
+static remap_status sort_half_edges(rm_arena *scratch, const rm_trimesh *m, rm_lid **out_offset, uint64_t **out, rm_lid *num_edges)
 {
   static const int low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
   const rm_lid nt = m->num_triangles, nv = m->num_vertices;
-  const int64_t n3 = 3 * (int64_t)nt;
-  rm_lid (*triangle_edge)[3], (*edge)[2], *star_offset, *star, *offset, ne = 0;
-  uint64_t *half; /* upper vertex, then 4 * triangle + h, so that they ascend and the triangles of an edge too */
+  rm_lid      *offset, ne = 0;
+  uint64_t    *half;
 
   RM_NEW0(offset, scratch, (int64_t)nv + 2);
-  RM_NEW(half, scratch, n3);
+  RM_NEW(half, scratch, 3 * (int64_t)nt);
   for (rm_lid t = 0; t < nt; t++)
     for (int h = 0; h < 3; h++) offset[m->triangle[t][low[h]] + 2]++;
   for (rm_lid v = 0; v < nv; v++) offset[v + 2] += offset[v + 1];
   for (rm_lid t = 0; t < nt; t++)
     for (int h = 0; h < 3; h++) half[offset[m->triangle[t][low[h]] + 1]++] = (uint64_t)m->triangle[t][high[h]] << 32 | (uint64_t)(4 * t + h);
-  RM_NEW(triangle_edge, arena, nt);
-  RM_NEW(edge, arena, n3);
-  RM_NEW(star_offset, arena, n3 + 1);
-  RM_NEW(star, arena, n3);
   for (rm_lid v = 0; v < nv; v++) {
     rm_sort_words(half + offset[v], offset[v + 1] - offset[v]);
+    for (rm_lid i = offset[v]; i < offset[v + 1]; i++) ne += i == offset[v] || half[i] >> 32 != half[i - 1] >> 32;
+  }
+  *out_offset = offset;
+  *out        = half;
+  *num_edges  = ne;
+  return REMAP_OK;
+}
+
+static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+{
+  const rm_lid nt = m->num_triangles;
+  rm_lid (*triangle_edge)[3], (*edge)[2], *star_offset, *star, *offset, num_edges, ne = 0;
+  uint64_t *half;
+
+  RM_TRY(sort_half_edges(scratch, m, &offset, &half, &num_edges));
+  RM_NEW(triangle_edge, arena, nt);
+  RM_NEW(edge, arena, num_edges);
+  RM_NEW(star_offset, arena, (int64_t)num_edges + 1);
+  RM_NEW(star, arena, 3 * (int64_t)nt);
+  for (rm_lid v = 0; v < m->num_vertices; v++)
     for (rm_lid i = offset[v]; i < offset[v + 1]; i++) {
       const rm_lid at = (rm_lid)(uint32_t)half[i];
 
@@ -295,8 +324,7 @@ static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh 
       star[i] = at;
       triangle_edge[at / 4][at % 4] = ne - 1;
     }
-  }
-  star_offset[ne]  = (rm_lid)n3;
+  star_offset[ne]  = 3 * nt;
   m->num_edges     = ne;
   m->edge          = (const rm_lid (*)[2])edge;
   m->triangle_edge = (const rm_lid (*)[3])triangle_edge;
