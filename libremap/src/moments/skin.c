@@ -143,7 +143,7 @@ static int look_at(void *user, rm_lid b)
 
   if (k->side[b][0] != s->cell[1 - s->mesh] && k->side[b][1] != s->cell[1 - s->mesh]) return 0;
   if (!rm_moments_coplanar(s->w, s->mesh, s->t, 1 - s->mesh, b) || !rm_moments_normal_sign(k, b, s->axis)) return 0;
-  if (!s->is_flat && (facing(s, b) < 0 || !is_just_inside(s, b))) return 0;
+  if (!is_just_inside(s, b) || (!s->is_flat && facing(s, b) < 0)) return 0;
   if (is_same_triangle(s, b)) s->is_same = true;
   s->num_strips = add_common(s->w, s->mesh, s->t, b, s->axis, s->num_strips);
   return s->is_same || s->w->status != REMAP_OK;
