@@ -11,6 +11,7 @@
 #define REMAP_BOOLEAN_H
 
 #include <cgns.h>
+#include <command.h>
 #include <mpi.h>
 #include <remap/remap.h>
 #include <slices.h>
@@ -20,20 +21,14 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/** Every exit status: name, number, text for --help. The greater one wins when ranks differ. */
-#define BOOL_EXIT_LIST(X)                                                                \
-  X(DONE, 0, "done")                                                                     \
-  X(USAGE, 2, "usage")                                                                   \
-  X(EMPTY, 3, "the result has no cells; OUT is not written")                             \
-  X(IO, 5, "input or output")                                                            \
-  X(GEOMETRY, 6, "a mesh is broken; a surface is open, not manifold, or crosses itself") \
-  X(INTERNAL, 7, "memory, MPI or an internal check")
-
-typedef enum bool_exit {
-#define X(name, number, text) BOOL_##name = number,
-  BOOL_EXIT_LIST(X)
-#undef X
-} bool_exit;
+/** Every exit status: which, text for --help. The greater one wins when ranks differ. */
+#define BOOL_EXIT_LIST(X)                                                                 \
+  X(CLI_DONE, "done")                                                                     \
+  X(CLI_USAGE, "usage")                                                                   \
+  X(CLI_COVERAGE, "the result has no cells; OUT is not written")                          \
+  X(CLI_IO, "input or output")                                                            \
+  X(CLI_GEOMETRY, "a mesh is broken; a surface is open, not manifold, or crosses itself") \
+  X(CLI_INTERNAL, "memory, MPI or an internal check")
 
 /** Every operation: word, REMAP_IN_ bits, text for --help. A is the source, B the target. */
 #define BOOL_OPERATION_LIST(X)                                                            \
@@ -43,30 +38,6 @@ typedef enum bool_exit {
   X("rdifference", REMAP_IN_TARGET, "B without A")                                        \
   X("imprint", REMAP_IN_BOTH | REMAP_IN_SOURCE, "all of A, cut where B's faces go through it")
 
-/** Why a step failed: one line without a newline, the same on every rank. */
-typedef struct bool_failure {
-  char text[1400];
-} bool_failure;
-
-/** Fill in *why in the manner of printf and hand code back. Not collective. */
-bool_exit bool_fail(bool_failure *why, bool_exit code, const char *format, ...) __attribute__((format(printf, 3, 4)));
-
-/** INTERNAL, with the words for it. Not collective. */
-bool_exit bool_no_memory(bool_failure *why);
-
-/** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
-bool_exit bool_agree(MPI_Comm comm, bool_exit mine, bool_failure *why);
-
-/** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
-bool_exit bool_from_cgns(rcgns_status status, const rcgns_message *message, bool_failure *why);
-
-/** Hand a failure up; only where nothing is owned. */
-#define BOOL_TRY(call)                            \
-  do {                                            \
-    const bool_exit bool_try_ = (call);           \
-    if (bool_try_ != BOOL_DONE) return bool_try_; \
-  } while (0)
-
 /* ---- options ------------------------------------------------------------------------------------------------------- */
 
 /** What was asked for. Texts point into argv; NULL where an option was not given. */
@@ -74,6 +45,7 @@ typedef struct bool_options {
   const char *operation; /**< its word */
   int         keep;      /**< its REMAP_IN_ bits */
   const char *path[2];   /**< A, B */
+  int         num_words; /**< operation and paths so far */
   const char *output, *report;
   const char *fields;   /**< names and globs, comma separated */
   const char *solution; /**< of both operands */
@@ -85,7 +57,7 @@ typedef struct bool_options {
 
 /** Read the command line. With --help or --version nothing else is demanded. The same on all ranks; not collective.
  *  Errors: USAGE. */
-bool_exit bool_options_parse(int argc, char **argv, bool_options *out, bool_failure *why);
+cli_exit bool_options_parse(int argc, char **argv, bool_options *out, cli_failure *why);
 
 /** What --help prints. Not collective. */
 void bool_options_help(FILE *out);
@@ -111,7 +83,7 @@ typedef struct bool_operand {
 
 /** Open operand number side (0: A, 1: B): by its ending a surface, else CGNS. Collective. Errors: USAGE, IO, GEOMETRY,
  *  INTERNAL. */
-bool_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, bool_failure *why);
+cli_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, cli_failure *why);
 
 /** Give everything back. Collective, and harmless on none. */
 void bool_operand_close(bool_operand *operand);
@@ -128,19 +100,19 @@ typedef struct bool_content {
 /** Take over what the cells and faces of the operands have. A field that both have is A's in the cells of A, else B's; a cell
  *  without a value gets NaN. A face that lies in faces of both belongs to A's boundary. Collective. Errors: USAGE (a field that
  *  neither has), IO, INTERNAL. */
-bool_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
-                            const remap_supermesh_view *view, bool_content *out, bool_failure *why);
-void      bool_content_drop(bool_content *content);
+cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                           const remap_supermesh_view *view, bool_content *out, cli_failure *why);
+void     bool_content_drop(bool_content *content);
 
 /* ---- output -------------------------------------------------------------------------------------------------------- */
 
 /** Refuse an output that cannot be right: an input, something that is no regular file, a place that cannot be written. Nothing
  *  is changed. Collective. Errors: USAGE, IO. */
-bool_exit bool_output_check(MPI_Comm comm, const bool_options *options, bool_failure *why);
+cli_exit bool_output_check(MPI_Comm comm, const bool_options *options, cli_failure *why);
 
 /** Write the result by the ending of the output's name; it appears when it is complete. Collective. Errors: USAGE, IO,
  *  INTERNAL. */
-bool_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, bool_failure *why);
+cli_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, cli_failure *why);
 
 /* ---- report -------------------------------------------------------------------------------------------------------- */
 
@@ -164,9 +136,9 @@ void bool_report_count(MPI_Comm comm, const remap_supermesh_view *view, bool_rep
 void bool_report_print(FILE *out, const bool_report *report);
 /** Make sure that the report can be written, before the work begins. One rank calls, and bool_report_end in the end. Errors:
  *  IO. */
-bool_exit bool_report_begin(bool_report *report, bool_failure *why);
+cli_exit bool_report_begin(bool_report *report, cli_failure *why);
 /** JSON for programs; the file appears when it is complete. The same rank calls. Errors: IO, INTERNAL. */
-bool_exit bool_report_write(bool_report *report, bool_failure *why);
+cli_exit bool_report_write(bool_report *report, cli_failure *why);
 /** Leave nothing behind that is not complete. */
 void bool_report_end(bool_report *report);
 

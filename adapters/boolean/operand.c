@@ -9,54 +9,54 @@
 
 /* ---- surfaces ------------------------------------------------------------------------------------------------------ */
 
-static bool_exit from_surface(rsurf_status status, const rsurf_message *message, bool_failure *why)
+static cli_exit from_surface(rsurf_status status, const rsurf_message *message, cli_failure *why)
 {
-  static const bool_exit code[] = {[RSURF_OK]       = BOOL_DONE,
-                                   [RSURF_USAGE]    = BOOL_USAGE,
-                                   [RSURF_IO]       = BOOL_IO,
-                                   [RSURF_GEOMETRY] = BOOL_GEOMETRY,
-                                   [RSURF_MEMORY]   = BOOL_INTERNAL};
+  static const cli_exit code[] = {[RSURF_OK]       = CLI_DONE,
+                                  [RSURF_USAGE]    = CLI_USAGE,
+                                  [RSURF_IO]       = CLI_IO,
+                                  [RSURF_GEOMETRY] = CLI_GEOMETRY,
+                                  [RSURF_MEMORY]   = CLI_INTERNAL};
 
-  return status == RSURF_OK ? BOOL_DONE : bool_fail(why, code[status], "%s", message->text);
+  return status == RSURF_OK ? CLI_DONE : cli_fail(why, code[status], "%s", message->text);
 }
 
 /* Rank 0 alone. */
-static bool_exit read_surface(const char *path, double scale, bool_operand *o, bool_failure *why)
+static cli_exit read_surface(const char *path, double scale, bool_operand *o, cli_failure *why)
 {
   rsurf_message message;
 
-  BOOL_TRY(from_surface(rsurf_read(path, scale, &o->surface, &message), &message, why));
+  CLI_TRY(from_surface(rsurf_read(path, scale, &o->surface, &message), &message, why));
   return from_surface(rsurf_repair(&o->surface, path, &o->repairs, &message), &message, why);
 }
 
 /* Rank 0's list of texts to all. The caller's texts stay his. Collective. */
-static bool_exit share_names(MPI_Comm comm, int num, char *const *from, char ***out, bool_failure *why)
+static cli_exit share_names(MPI_Comm comm, int num, char *const *from, char ***out, cli_failure *why)
 {
   int rank;
 
   MPI_Comm_rank(comm, &rank);
   *out = calloc((size_t)num + 1, sizeof **out);
-  BOOL_TRY(bool_agree(comm, *out ? BOOL_DONE : bool_no_memory(why), why));
+  CLI_TRY(cli_agree_on(comm, *out ? CLI_DONE : cli_no_memory(why), why));
   for (int i = 0; i < num; i++) {
     int length = rank == 0 ? (int)strlen(from[i]) : 0;
 
     MPI_Bcast(&length, 1, MPI_INT, 0, comm);
     (*out)[i] = calloc((size_t)length + 1, 1);
-    BOOL_TRY(bool_agree(comm, (*out)[i] ? BOOL_DONE : bool_no_memory(why), why));
+    CLI_TRY(cli_agree_on(comm, (*out)[i] ? CLI_DONE : cli_no_memory(why), why));
     if (rank == 0) memcpy((*out)[i], from[i], (size_t)length);
     MPI_Bcast((*out)[i], length, MPI_CHAR, 0, comm);
   }
-  return BOOL_DONE;
+  return CLI_DONE;
 }
 
-static bool_exit open_surface(MPI_Comm comm, const char *path, double scale, bool_operand *o, bool_failure *why)
+static cli_exit open_surface(MPI_Comm comm, const char *path, double scale, bool_operand *o, cli_failure *why)
 {
   int64_t count[2] = {0, 0};
   int     rank;
 
   MPI_Comm_rank(comm, &rank);
   o->is_surface = true;
-  BOOL_TRY(bool_agree(comm, rank == 0 ? read_surface(path, scale, o, why) : BOOL_DONE, why));
+  CLI_TRY(cli_agree_on(comm, rank == 0 ? read_surface(path, scale, o, why) : CLI_DONE, why));
   if (rank == 0) {
     count[0] = o->surface.num_bodies;
     count[1] = o->surface.num_groups;
@@ -67,14 +67,14 @@ static bool_exit open_surface(MPI_Comm comm, const char *path, double scale, boo
   o->num_boundaries = (int)count[1];
   o->mesh           = rsurf_mesh(&o->surface, path);
   o->face_boundary  = o->surface.face_group;
-  BOOL_TRY(share_names(comm, o->num_boundaries, o->surface.group_name, &o->own_name, why));
+  CLI_TRY(share_names(comm, o->num_boundaries, o->surface.group_name, &o->own_name, why));
   o->boundary_name = (const char *const *)o->own_name;
-  return BOOL_DONE;
+  return CLI_DONE;
 }
 
 /* ---- meshes -------------------------------------------------------------------------------------------------------- */
 
-static bool_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, bool_operand *o, bool_failure *why)
+static cli_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, bool_operand *o, cli_failure *why)
 {
   rcgns_options    how;
   rcgns_choice     choice;
@@ -84,10 +84,10 @@ static bool_exit open_mesh(MPI_Comm comm, const bool_options *options, int side,
   rcgns_options_default(&how);
   how.base = options->base[side];
   if (side == 1) how.scale = options->scale;
-  BOOL_TRY(bool_from_cgns(rcgns_open(comm, o->path, &how, &o->file, &message), &message, why));
+  CLI_TRY(cli_from_cgns(rcgns_open(comm, o->path, &how, &o->file, &message), &message, why));
   o->mesh      = *rcgns_mesh(o->file);
   o->num_cells = rcgns_get_info(o->file)->num_cells;
-  BOOL_TRY(bool_from_cgns(rcgns_read_boundaries(o->file, &boundaries, &message), &message, why));
+  CLI_TRY(cli_from_cgns(rcgns_read_boundaries(o->file, &boundaries, &message), &message, why));
   o->num_boundaries = boundaries.num;
   o->boundary_name  = boundaries.name;
   o->boundary_type  = boundaries.type;
@@ -95,10 +95,10 @@ static bool_exit open_mesh(MPI_Comm comm, const bool_options *options, int side,
   rcgns_choice_default(&choice);
   choice.name     = options->solution;
   choice.optional = 1;
-  return bool_from_cgns(rcgns_select_solution(o->file, &choice, &o->solution, &message), &message, why);
+  return cli_from_cgns(rcgns_select_solution(o->file, &choice, &o->solution, &message), &message, why);
 }
 
-bool_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, bool_failure *why)
+cli_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side, bool_operand *out, cli_failure *why)
 {
   *out = (bool_operand){.path = options->path[side]};
   if (rsurf_is_path(out->path)) return open_surface(comm, out->path, side == 1 ? options->scale : 1.0, out, why);
@@ -128,24 +128,24 @@ static int32_t number_of(bool_content *c, const char *name, const char *type)
 }
 
 /* Boundary of the faces of the result that lie in faces of one operand; those that have one already keep it. Collective. */
-static bool_exit take_boundaries(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, int64_t num_faces,
-                                 bool_content *c, bool_failure *why)
+static cli_exit take_boundaries(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, int64_t num_faces,
+                                bool_content *c, cli_failure *why)
 {
   int32_t *mine     = malloc(((size_t)o->mesh.num_faces + 1) * sizeof *mine);
   int32_t *taken    = malloc(((size_t)num_faces + 1) * sizeof *taken),
           *number   = calloc((size_t)o->num_boundaries + 1, sizeof *number);
-  bool_exit    code = bool_agree(comm, mine && taken && number ? BOOL_DONE : bool_no_memory(why), why);
+  cli_exit     code = cli_agree_on(comm, mine && taken && number ? CLI_DONE : cli_no_memory(why), why);
   remap_status status;
 
-  for (int b = 0; code == BOOL_DONE && b < o->num_boundaries; b++)
+  for (int b = 0; code == CLI_DONE && b < o->num_boundaries; b++)
     number[b] = number_of(c, o->boundary_name[b], o->boundary_type ? o->boundary_type[b] : "UserDefined");
-  for (int64_t f = 0; code == BOOL_DONE && f < o->mesh.num_faces; f++)
+  for (int64_t f = 0; code == CLI_DONE && f < o->mesh.num_faces; f++)
     mine[f] = o->face_boundary && o->face_boundary[f] >= 0 ? number[o->face_boundary[f]] : -1;
-  if (code == BOOL_DONE) {
+  if (code == CLI_DONE) {
     status = remap_supermesh_face_values(ctx, (remap_side)side, mine, -1, taken);
-    if (status != REMAP_OK) code = bool_fail(why, BOOL_INTERNAL, "%s: %s", o->path, remap_status_text(status));
+    if (status != REMAP_OK) code = cli_fail(why, CLI_INTERNAL, "%s: %s", o->path, remap_status_text(status));
   }
-  for (int64_t f = 0; code == BOOL_DONE && f < num_faces; f++)
+  for (int64_t f = 0; code == CLI_DONE && f < num_faces; f++)
     if (c->face_boundary[f] < 0) c->face_boundary[f] = taken[f];
   free(mine);
   free(taken);
@@ -199,47 +199,47 @@ static int list_fields(const bool_options *options, const bool_operand operand[2
 }
 
 /* A field of one operand for the cells that lie in it; where only is set, for those alone that do not lie in A. Collective. */
-static bool_exit take_field(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, const char *name,
-                            const remap_supermesh_view *view, bool after_a, double *values, bool_failure *why)
+static cli_exit take_field(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, const char *name,
+                           const remap_supermesh_view *view, bool after_a, double *values, cli_failure *why)
 {
   double       *in   = malloc(((size_t)o->mesh.num_cells + 1) * sizeof *in);
   double       *out  = malloc(((size_t)view->num_cells + 1) * sizeof *out);
-  bool_exit     code = bool_agree(comm, in && out ? BOOL_DONE : bool_no_memory(why), why);
+  cli_exit      code = cli_agree_on(comm, in && out ? CLI_DONE : cli_no_memory(why), why);
   rcgns_message message;
   remap_status  status;
 
-  if (code == BOOL_DONE) code = bool_from_cgns(rcgns_read_field(o->file, name, in, &message), &message, why);
-  if (code == BOOL_DONE) {
+  if (code == CLI_DONE) code = cli_from_cgns(rcgns_read_field(o->file, name, in, &message), &message, why);
+  if (code == CLI_DONE) {
     status = remap_supermesh_cell_values(ctx, (remap_side)side, in, NAN, out);
-    if (status != REMAP_OK) code = bool_fail(why, BOOL_INTERNAL, "%s: %s", o->path, remap_status_text(status));
+    if (status != REMAP_OK) code = cli_fail(why, CLI_INTERNAL, "%s: %s", o->path, remap_status_text(status));
   }
-  for (int64_t c = 0; code == BOOL_DONE && c < view->num_cells; c++)
+  for (int64_t c = 0; code == CLI_DONE && c < view->num_cells; c++)
     if (!after_a || view->cell_ancestor[0][c] < 0) values[c] = out[c];
   free(in);
   free(out);
   return code;
 }
 
-static bool_exit take_fields(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
-                             const remap_supermesh_view *view, bool_content *c, bool_failure *why)
+static cli_exit take_fields(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                            const remap_supermesh_view *view, bool_content *c, cli_failure *why)
 {
   const char **name = calloc((size_t)(operand[0].solution.num_fields + operand[1].solution.num_fields) + 1, sizeof *name);
   int          num  = name ? list_fields(options, operand, name) : 0;
-  bool_exit    code;
+  cli_exit     code;
 
   c->field  = calloc((size_t)num + 1, sizeof *c->field);
   c->values = malloc(((size_t)num * (size_t)view->num_cells + 1) * sizeof *c->values);
-  code      = bool_agree(comm, name && c->field && c->values ? BOOL_DONE : bool_no_memory(why), why);
-  if (code == BOOL_DONE && options->fields && !num)
-    code = bool_fail(why, BOOL_USAGE, "--fields: neither %s nor %s has a cell-centred field '%.200s' in all zones",
-                     options->path[0], options->path[1], options->fields);
-  for (int k = 0; k < num && code == BOOL_DONE; k++) {
+  code      = cli_agree_on(comm, name && c->field && c->values ? CLI_DONE : cli_no_memory(why), why);
+  if (code == CLI_DONE && options->fields && !num)
+    code = cli_fail(why, CLI_USAGE, "--fields: neither %s nor %s has a cell-centred field '%.200s' in all zones",
+                    options->path[0], options->path[1], options->fields);
+  for (int k = 0; k < num && code == CLI_DONE; k++) {
     double *values = c->values + (size_t)k * (size_t)view->num_cells;
     bool    in_a   = false;
 
     c->field[k] = (rslice_field){.name = name[k], .values = values};
     for (int64_t i = 0; i < view->num_cells; i++) values[i] = NAN;
-    for (int side = 0; side < 2 && code == BOOL_DONE; side++) {
+    for (int side = 0; side < 2 && code == CLI_DONE; side++) {
       if (find_field(&operand[side], name[k]) < 0) continue;
       code = take_field(comm, ctx, side, &operand[side], name[k], view, in_a, values, why);
       in_a = true;
@@ -253,23 +253,23 @@ static bool_exit take_fields(MPI_Comm comm, const bool_options *options, remap_c
 
 /* ---- both ---------------------------------------------------------------------------------------------------------- */
 
-bool_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
-                            const remap_supermesh_view *view, bool_content *out, bool_failure *why)
+cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
+                           const remap_supermesh_view *view, bool_content *out, cli_failure *why)
 {
   const size_t most = (size_t)(operand[0].num_boundaries + operand[1].num_boundaries) + 1;
-  bool_exit    code;
+  cli_exit     code;
 
   *out = (bool_content){.content       = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}},
                         .boundary_name = calloc(most, sizeof *out->boundary_name),
                         .boundary_type = calloc(most, sizeof *out->boundary_type),
                         .face_boundary = malloc(((size_t)view->num_faces + 1) * sizeof *out->face_boundary)};
-  code = out->boundary_name && out->boundary_type && out->face_boundary ? BOOL_DONE : bool_no_memory(why);
-  BOOL_TRY(bool_agree(comm, code, why));
+  code = out->boundary_name && out->boundary_type && out->face_boundary ? CLI_DONE : cli_no_memory(why);
+  CLI_TRY(cli_agree_on(comm, code, why));
   out->content.boundary_name = out->boundary_name;
   out->content.boundary_type = out->boundary_type;
   out->content.face_boundary = out->face_boundary;
   for (int64_t f = 0; f < view->num_faces; f++) out->face_boundary[f] = -1;
-  for (int side = 0; side < 2; side++) BOOL_TRY(take_boundaries(comm, ctx, side, &operand[side], view->num_faces, out, why));
+  for (int side = 0; side < 2; side++) CLI_TRY(take_boundaries(comm, ctx, side, &operand[side], view->num_faces, out, why));
   return take_fields(comm, options, ctx, operand, view, out, why);
 }
 

@@ -24,21 +24,21 @@ static bool is_same_file(const char *one, const char *other)
 }
 
 /* Can a file be made there? Rank 0 alone. */
-static bool_exit check_path(const char *path, const char *word, const bool_options *options, bool_failure *why)
+static cli_exit check_path(const char *path, const char *word, const bool_options *options, cli_failure *why)
 {
   const char *slash  = strrchr(path, '/');
   char       *folder = slash == path ? strdup("/") : slash ? strndup(path, (size_t)(slash - path)) : strdup(".");
   struct stat st;
-  bool_exit   code = BOOL_DONE;
+  cli_exit    code = CLI_DONE;
 
-  if (!folder) return bool_no_memory(why);
-  for (int side = 0; side < 2 && code == BOOL_DONE; side++)
+  if (!folder) return cli_no_memory(why);
+  for (int side = 0; side < 2 && code == CLI_DONE; side++)
     if (is_same_file(path, options->path[side]))
-      code = bool_fail(why, BOOL_USAGE, "%s: it is one of the input files: choose another %s", path, word);
-  if (code == BOOL_DONE && !stat(path, &st) && !S_ISREG(st.st_mode))
-    code = bool_fail(why, BOOL_IO, "%s: it exists and is not a regular file: choose another %s", path, word);
-  if (code == BOOL_DONE && access(folder, W_OK | X_OK))
-    code = bool_fail(why, BOOL_IO, "%s: its folder cannot be written (%s): choose another %s", path, strerror(errno), word);
+      code = cli_fail(why, CLI_USAGE, "%s: it is one of the input files: choose another %s", path, word);
+  if (code == CLI_DONE && !stat(path, &st) && !S_ISREG(st.st_mode))
+    code = cli_fail(why, CLI_IO, "%s: it exists and is not a regular file: choose another %s", path, word);
+  if (code == CLI_DONE && access(folder, W_OK | X_OK))
+    code = cli_fail(why, CLI_IO, "%s: its folder cannot be written (%s): choose another %s", path, strerror(errno), word);
   free(folder);
   return code;
 }
@@ -50,17 +50,17 @@ static bool ends_in(const char *path, const char *ending)
   return n > m && !strcasecmp(path + n - m, ending);
 }
 
-bool_exit bool_output_check(MPI_Comm comm, const bool_options *options, bool_failure *why)
+cli_exit bool_output_check(MPI_Comm comm, const bool_options *options, cli_failure *why)
 {
-  bool_exit code = BOOL_DONE;
-  int       rank;
+  cli_exit code = CLI_DONE;
+  int      rank;
 
   MPI_Comm_rank(comm, &rank);
   if (!rsurf_is_path(options->output) && !rvtk_is_path(options->output) && !ends_in(options->output, ".cgns"))
-    return bool_fail(why, BOOL_USAGE, "%s: its ending says no format: give OUT as .cgns, .vtu, .stl or .obj", options->output);
+    return cli_fail(why, CLI_USAGE, "%s: its ending says no format: give OUT as .cgns, .vtu, .stl or .obj", options->output);
   if (rank == 0) code = check_path(options->output, "OUT", options, why);
-  if (rank == 0 && code == BOOL_DONE && options->report) code = check_path(options->report, "report", options, why);
-  return bool_agree(comm, code, why);
+  if (rank == 0 && code == CLI_DONE && options->report) code = check_path(options->report, "report", options, why);
+  return cli_agree_on(comm, code, why);
 }
 
 /* ---- outer surface ------------------------------------------------------------------------------------------------- */
@@ -104,15 +104,15 @@ static bool list_outer(const rslice_content *content, outer *out)
 }
 
 /* The faces of a slice join the surface on rank 0. */
-static bool_exit add_faces(const int64_t *word, int64_t num, rsurf_builder *builder, bool_failure *why)
+static cli_exit add_faces(const int64_t *word, int64_t num, rsurf_builder *builder, cli_failure *why)
 {
   rsurf_message message;
 
   for (int64_t at = 0; at < num; at += 2 + 3 * word[at])
     if (rsurf_add(builder, (const double *)(const void *)(word + at + 2), word[at], (int32_t)word[at + 1], &message) !=
         RSURF_OK)
-      return bool_fail(why, BOOL_INTERNAL, "%s", message.text);
-  return BOOL_DONE;
+      return cli_fail(why, CLI_INTERNAL, "%s", message.text);
+  return CLI_DONE;
 }
 
 /* Words from one rank to rank 0, in pieces that MPI can count. */
@@ -141,7 +141,7 @@ static int64_t *receive_words(MPI_Comm comm, int rank, int64_t *num)
 }
 
 /* All outer faces in their order, into a surface on rank 0. Collective, whatever happens. */
-static bool_exit collect(MPI_Comm comm, const rslice_rows *rows, rsurf_builder *builder, bool_exit code, bool_failure *why)
+static cli_exit collect(MPI_Comm comm, const rslice_rows *rows, rsurf_builder *builder, cli_exit code, cli_failure *why)
 {
   const int64_t mine = rows->offset[rows->num];
   int           rank, size;
@@ -150,67 +150,67 @@ static bool_exit collect(MPI_Comm comm, const rslice_rows *rows, rsurf_builder *
   MPI_Comm_size(comm, &size);
   if (rank) {
     send_words(comm, rows->word, mine);
-    return BOOL_DONE;
+    return CLI_DONE;
   }
-  if (code == BOOL_DONE) code = add_faces(rows->word, mine, builder, why);
+  if (code == CLI_DONE) code = add_faces(rows->word, mine, builder, why);
   for (int r = 1; r < size; r++) {
     int64_t  num;
     int64_t *word = receive_words(comm, r, &num);
 
-    if (code == BOOL_DONE) code = word ? add_faces(word, num, builder, why) : bool_no_memory(why);
+    if (code == CLI_DONE) code = word ? add_faces(word, num, builder, why) : cli_no_memory(why);
     free(word);
   }
   return code;
 }
 
 /* Rank 0 alone. */
-static bool_exit write_text(const char *path, const rsurf_surface *surface, bool_failure *why)
+static cli_exit write_text(const char *path, const rsurf_surface *surface, cli_failure *why)
 {
   char          part[PATH_MAX] = "";
   int           error          = rslice_file_begin(path, part, sizeof part);
   FILE         *out            = error ? NULL : fopen(part, "w");
   rsurf_message message;
-  bool_exit     code = BOOL_DONE;
+  cli_exit      code = CLI_DONE;
 
-  if (!out) return bool_fail(why, BOOL_IO, "%s: it cannot be written: %s", path, strerror(error ? error : errno));
-  if (rsurf_write(out, path, surface, &message) != RSURF_OK) code = bool_fail(why, BOOL_IO, "%s", message.text);
-  if (fclose(out) && code == BOOL_DONE) code = bool_fail(why, BOOL_IO, "%s: it cannot be written: is the disk full?", path);
-  error = code == BOOL_DONE ? rslice_file_finish(part, path) : 0;
-  if (error) code = bool_fail(why, BOOL_IO, "%s: it cannot be written: %s", path, strerror(error));
-  if (code != BOOL_DONE) unlink(part);
+  if (!out) return cli_fail(why, CLI_IO, "%s: it cannot be written: %s", path, strerror(error ? error : errno));
+  if (rsurf_write(out, path, surface, &message) != RSURF_OK) code = cli_fail(why, CLI_IO, "%s", message.text);
+  if (fclose(out) && code == CLI_DONE) code = cli_fail(why, CLI_IO, "%s: it cannot be written: is the disk full?", path);
+  error = code == CLI_DONE ? rslice_file_finish(part, path) : 0;
+  if (error) code = cli_fail(why, CLI_IO, "%s: it cannot be written: %s", path, strerror(error));
+  if (code != CLI_DONE) unlink(part);
   return code;
 }
 
 /* The surface of rank 0 from the builder, which ends. */
-static bool_exit finish_surface(const char *path, rsurf_builder **builder, bool_exit code, bool_failure *why)
+static cli_exit finish_surface(const char *path, rsurf_builder **builder, cli_exit code, cli_failure *why)
 {
   rsurf_surface surface = {.num_nodes = 0};
   rsurf_message message;
 
   rsurf_end(builder, &surface);
-  if (code == BOOL_DONE && ends_in(path, ".stl") && rsurf_triangulate(&surface, &message) != RSURF_OK)
-    code = bool_fail(why, BOOL_INTERNAL, "%s", message.text);
-  if (code == BOOL_DONE) code = write_text(path, &surface, why);
+  if (code == CLI_DONE && ends_in(path, ".stl") && rsurf_triangulate(&surface, &message) != RSURF_OK)
+    code = cli_fail(why, CLI_INTERNAL, "%s", message.text);
+  if (code == CLI_DONE) code = write_text(path, &surface, why);
   rsurf_drop(&surface);
   return code;
 }
 
 /* A builder with the boundaries as groups, and one for faces that are on none. Rank 0 alone. */
-static bool_exit begin_surface(const rslice_content *content, rsurf_builder **out, bool_failure *why)
+static cli_exit begin_surface(const rslice_content *content, rsurf_builder **out, cli_failure *why)
 {
   const char  **name = calloc((size_t)content->num_boundaries + 1, sizeof *name);
   rsurf_message message;
-  bool_exit     code = name ? BOOL_DONE : bool_no_memory(why);
+  cli_exit      code = name ? CLI_DONE : cli_no_memory(why);
 
   for (int b = 0; name && b < content->num_boundaries; b++) name[b] = content->boundary_name[b];
   if (name) name[content->num_boundaries] = "unnamed";
   if (name && rsurf_begin(content->num_boundaries + 1, name, out, &message) != RSURF_OK)
-    code = bool_fail(why, BOOL_INTERNAL, "%s", message.text);
+    code = cli_fail(why, CLI_INTERNAL, "%s", message.text);
   free(name);
   return code;
 }
 
-static bool_exit write_surface(MPI_Comm comm, const char *path, const rslice_content *content, bool_failure *why)
+static cli_exit write_surface(MPI_Comm comm, const char *path, const rslice_content *content, cli_failure *why)
 {
   const remap_supermesh_view *m       = content->mesh;
   outer                       list    = {NULL, NULL};
@@ -219,23 +219,23 @@ static bool_exit write_surface(MPI_Comm comm, const char *path, const rslice_con
   const rslice_status         mine = list_outer(content, &list) ? RSLICE_OK : RSLICE_MEMORY;
   const rslice_status         status =
       rslice_ship(comm, mine, m->global_faces, m->num_faces, m->face_global, list.offset, list.word, &rows);
-  bool_exit code = BOOL_DONE;
-  int       rank;
+  cli_exit code = CLI_DONE;
+  int      rank;
 
   MPI_Comm_rank(comm, &rank);
   free(list.offset);
   free(list.word);
-  if (status != RSLICE_OK) return bool_fail(why, BOOL_INTERNAL, "%s: %s", path, rslice_status_text(status));
+  if (status != RSLICE_OK) return cli_fail(why, CLI_INTERNAL, "%s: %s", path, rslice_status_text(status));
   if (rank == 0) code = begin_surface(content, &builder, why);
   code = collect(comm, &rows, builder, code, why);
   if (rank == 0) code = finish_surface(path, &builder, code, why);
   rslice_drop(&rows);
-  return bool_agree(comm, code, why);
+  return cli_agree_on(comm, code, why);
 }
 
 /* ---- which --------------------------------------------------------------------------------------------------------- */
 
-bool_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, bool_failure *why)
+cli_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, cli_failure *why)
 {
   rcgns_message message;
   rvtk_message  text;
@@ -243,8 +243,8 @@ bool_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rs
 
   if (rsurf_is_path(options->output)) return write_surface(comm, options->output, content, why);
   if (!rvtk_is_path(options->output))
-    return bool_from_cgns(rcgns_write_supermesh(comm, options->output, CGNS_VERSION, content, &message), &message, why);
+    return cli_from_cgns(rcgns_write_supermesh(comm, options->output, CGNS_VERSION, content, &message), &message, why);
   status = rvtk_write(comm, options->output, content, &text);
-  if (status == RVTK_OK) return BOOL_DONE;
-  return bool_fail(why, status == RVTK_IO ? BOOL_IO : BOOL_INTERNAL, "%s", text.text);
+  if (status == RVTK_OK) return CLI_DONE;
+  return cli_fail(why, status == RVTK_IO ? CLI_IO : CLI_INTERNAL, "%s", text.text);
 }

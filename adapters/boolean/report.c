@@ -145,23 +145,23 @@ static json_t *report_json(const bool_report *r)
                    "numbering", v->seconds_numbering, "memory", "peak_rss_bytes_max", (json_int_t)r->peak_rss);
 }
 
-static bool_exit cannot_write(const bool_report *report, int error, bool_failure *why)
+static cli_exit cannot_write(const bool_report *report, int error, cli_failure *why)
 {
-  if (!error) return BOOL_DONE;
-  return bool_fail(why, BOOL_IO, "%s: the report cannot be written: %s", report->options->report, strerror(error));
+  if (!error) return CLI_DONE;
+  return cli_fail(why, CLI_IO, "%s: the report cannot be written: %s", report->options->report, strerror(error));
 }
 
-bool_exit bool_report_begin(bool_report *report, bool_failure *why)
+cli_exit bool_report_begin(bool_report *report, cli_failure *why)
 {
   return cannot_write(report, rslice_file_begin(report->options->report, report->part, sizeof report->part), why);
 }
 
-bool_exit bool_report_write(bool_report *report, bool_failure *why)
+cli_exit bool_report_write(bool_report *report, cli_failure *why)
 {
   json_t *json  = report_json(report);
   int     error = 0;
 
-  if (!json) return bool_no_memory(why);
+  if (!json) return cli_no_memory(why);
   if (json_dump_file(json, report->part, JSON_INDENT(2) | JSON_REAL_PRECISION(17))) error = errno ? errno : EIO;
   if (!error) error = rslice_file_finish(report->part, report->options->report);
   if (!error) report->part[0] = 0;

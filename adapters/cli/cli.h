@@ -11,6 +11,7 @@
  *   supermesh.c --supermesh
  *   job.c       what these share
  *   options.c   the command line
+ *   command.c   what this and other commands share
  *   report.c    text for people, JSON for programs
  *   progress.c  a line now and then while a long job runs
  *

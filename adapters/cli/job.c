@@ -7,31 +7,9 @@
 
 /* ---- ranks together ----------------------------------------------------------------------------------------------- */
 
-cli_exit cli_agree(const cli_job *j, cli_exit mine, cli_failure *why)
-{
-  struct {
-    int code, rank;
-  } worst = {(int)mine, j->rank};
-
-  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_2INT, MPI_MAXLOC, j->comm);
-  if (worst.code != CLI_DONE) MPI_Bcast(why->text, sizeof why->text, MPI_CHAR, worst.rank, j->comm);
-  return (cli_exit)worst.code;
-}
-
-cli_exit cli_no_memory(cli_failure *why) { return cli_fail(why, CLI_INTERNAL, "memory is out on one rank: use more ranks"); }
+cli_exit cli_agree(const cli_job *j, cli_exit mine, cli_failure *why) { return cli_agree_on(j->comm, mine, why); }
 
 /* ---- failures of others in our words ------------------------------------------------------------------------------ */
-
-cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why)
-{
-  static const cli_exit code[] = {[RCGNS_OK]       = CLI_DONE,
-                                  [RCGNS_USAGE]    = CLI_USAGE,
-                                  [RCGNS_IO]       = CLI_IO,
-                                  [RCGNS_GEOMETRY] = CLI_GEOMETRY,
-                                  [RCGNS_MEMORY]   = CLI_INTERNAL};
-
-  return status == RCGNS_OK ? CLI_DONE : cli_fail(why, code[status], "%s", message->text);
-}
 
 cli_exit cli_from_remap(const cli_job *j, remap_status status, cli_failure *why)
 {

@@ -3,6 +3,7 @@
 #define REMAP_CLI_JOB_H
 
 #include "cli.h"
+#include "command.h"
 #include "options.h"
 #include "progress.h"
 #include "report.h"
@@ -49,12 +50,6 @@ typedef struct cli_job {
 
 /** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
 cli_exit cli_agree(const cli_job *j, cli_exit mine, cli_failure *why);
-
-/** INTERNAL, with the words for it. Not collective. */
-cli_exit cli_no_memory(cli_failure *why);
-
-/** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
-cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why);
 
 /** Remember a remark for the report; one that finds no memory is lost. Not collective. */
 void cli_note(cli_job *j, const char *format, ...) __attribute__((format(printf, 2, 3)));

@@ -9,32 +9,10 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 #define PROGRESS_SECONDS 8.0 /* a line at least every 10 s is promised */
 
 /* ---- ranks together ----------------------------------------------------------------------------------------------- */
-
-/* Seconds since then, of the slowest rank. Collective. */
-static double slowest(const cli_job *j, double since)
-{
-  double seconds = MPI_Wtime() - since;
-
-  MPI_Allreduce(MPI_IN_PLACE, &seconds, 1, MPI_DOUBLE, MPI_MAX, j->comm);
-  return seconds;
-}
-
-/* The most memory that any rank has had. Collective. */
-static int64_t peak_rss(const cli_job *j)
-{
-  struct rusage usage;
-  int64_t       bytes;
-
-  getrusage(RUSAGE_SELF, &usage);
-  bytes = (int64_t)usage.ru_maxrss * 1024;
-  MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_INT64_T, MPI_MAX, j->comm);
-  return bytes;
-}
 
 /* What the files and the options leave to remark. */
 static void collect_notes(cli_job *j)
@@ -190,7 +168,7 @@ static cli_exit transfer(cli_job *j, cli_failure *why)
   CLI_TRY(mine);
   j->report.num_fields       = j->num_fields;
   j->report.field            = j->row;
-  j->report.seconds_transfer = slowest(j, begin);
+  j->report.seconds_transfer = cli_slowest(j->comm, begin);
   return CLI_DONE;
 }
 
@@ -268,7 +246,7 @@ static cli_exit write_output(cli_job *j, cli_failure *why)
   cli_progress_set(j->progress, "writing", -1);
   if (j->options.source_coverage) CLI_TRY(write_source(j, why));
   CLI_TRY(write_target(j, why));
-  j->report.seconds_write = slowest(j, begin);
+  j->report.seconds_write = cli_slowest(j->comm, begin);
   return CLI_DONE;
 }
 
@@ -280,8 +258,8 @@ static cli_exit finish_report(cli_job *j, cli_failure *why)
   collect_notes(j);
   j->report.num_notes     = j->num_notes;
   j->report.note          = j->note;
-  j->report.peak_rss      = peak_rss(j);
-  j->report.seconds_total = slowest(j, j->begin);
+  j->report.peak_rss      = cli_peak_rss(j->comm);
+  j->report.seconds_total = cli_slowest(j->comm, j->begin);
   if (j->rank == 0) {
     if (!j->options.quiet) cli_report_end(stdout, &j->report);
     if (j->options.report) mine = cli_report_commit(&j->report_file, &j->report, why);
@@ -309,7 +287,7 @@ static cli_exit run(cli_job *j, cli_failure *why)
   CLI_TRY(cli_masks_read(j, why));
   CLI_TRY(cli_volumes_read(j, why));
   CLI_TRY(cli_priority_cut(j, why));
-  j->report.seconds_read = slowest(j, j->begin);
+  j->report.seconds_read = cli_slowest(j->comm, j->begin);
   MPI_Comm_size(j->comm, &j->report.stats.ranks);
   if (speaks) cli_report_meshes(stdout, &j->report, j->options.verbose);
   CLI_TRY(build(j, why));
@@ -358,7 +336,7 @@ int main(int argc, char **argv)
     if (j.rank == 0 && j.options.help) cli_options_help(stdout);
     if (j.rank == 0 && !j.options.help) printf("remap %s\n", remap_version());
   } else if (status == CLI_DONE) {
-    if (j.rank == 0 && !j.options.quiet) j.progress = cli_progress_start(stdout, PROGRESS_SECONDS);
+    if (j.rank == 0 && !j.options.quiet) j.progress = cli_progress_start("remap", stdout, PROGRESS_SECONDS);
     status = run(&j, &why);
     end(&j);
   }

@@ -1,80 +1,70 @@
 /* options -- the command line: one table of options makes getopt's list and the help, one table per option its words. */
 #include "options.h"
 
+#include "command.h"
+
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-cli_exit cli_fail(cli_failure *why, cli_exit code, const char *format, ...)
-{
-  va_list args;
-
-  va_start(args, format);
-  vsnprintf(why->text, sizeof why->text, format, args);
-  va_end(args);
-  return code;
-}
-
 /* ---- the table ---------------------------------------------------------------------------------------------------- */
 
-/* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or OTHER, what it does. A second
+/* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or CLI_OTHER, what it does. A second
  * line of help follows after \n. */
 #define AT(member) offsetof(cli_options, member)
-#define OPTION_LIST(X)                                                                                                        \
-  X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                      \
-  X(NATURE, 0, "nature", "NAME=NATURE,...", OTHER,                                                                            \
-    "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")   \
-  X(GAMMA, 0, "gamma", "RATIO", OTHER,                                                                                        \
-    "ratio of specific heats, to carry pressure as energy; default what\nFlowEquationSet or ReferenceState of SOURCE says")   \
-  X(ALLOW_NAN, 0, "allow-nan", NULL, AT(allow_nan), "let values that are no numbers pass: they spoil the cells they reach")   \
-  X(ORDER, 0, "order", "1|2|3", OTHER, "accuracy of the transfer; default 2")                                                 \
-  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", OTHER,                                                           \
-    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                             \
-  X(FACES, 0, "faces", "centre|diagonal", OTHER, "how faces become triangles; default centre")                                \
-  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error", OTHER,                                                  \
-    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                                   \
-  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error", OTHER,                                                     \
-    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                               \
-  X(MIN_COVERAGE, 0, "min-coverage", "SHARE", OTHER, "cells that are covered less than this count as not covered; default 0") \
-  X(COVERAGE, 0, "coverage", NULL, AT(coverage), "write how much of each cell SOURCE covers too, as field Coverage")          \
-  X(SOURCE_COVERAGE, 0, "source-coverage", "FILE", AT(source_coverage),                                                       \
-    "write SOURCE with how much of each of its cells TARGET covers")                                                          \
-  X(SOURCE_MASK, 0, "source-mask", "FIELD[=CODES]", AT(mask[REMAP_SOURCE]),                                                   \
-    "take values only where this field of SOURCE says 'computed':\ncellN 1, Iblank above 0, others not 0, or CODES such as "  \
-    "1+2")                                                                                                                    \
-  X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                   \
-    "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                          \
-  X(PRIORITY, 0, "priority", "BASE/ZONE,...", AT(priority),                                                                   \
-    "zones that overlap, the highest first, globs: what they hide of\nothers does not count; TARGET's cells get values one "  \
-    "by one")                                                                                                                 \
-  X(SOURCE_VOLUME, 0, "source-volume", "FIELD", AT(volume[REMAP_SOURCE]),                                                     \
-    "conserve what SOURCE's solver integrates, with its own cell volumes")                                                    \
-  X(TARGET_VOLUME, 0, "target-volume", "FIELD", AT(volume[REMAP_TARGET]), "likewise what TARGET's solver integrates")         \
-  X(LOCATION, 0, "location", "cell|vertex", OTHER,                                                                            \
-    "where fields are, in both files; default cell; vertex takes the\ncells of the median-dual mesh about the vertices")      \
-  X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")     \
-  X(STEP, 0, "step", "N|last", OTHER, "or the one of a time step, counted from 1")                                            \
-  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                       \
-    "the FlowSolution_t to write; default the source's name")                                                                 \
-  X(SOURCE_BASE, 0, "source-base", "NAME", AT(base[REMAP_SOURCE]), "read this base of SOURCE only")                           \
-  X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                           \
-  X(SCALE, 0, "scale", "FACTOR", OTHER, "multiply SOURCE's coordinates first")                                                \
-  X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")       \
-  X(KEEP_VECTORS, 0, "keep-vectors", NULL, AT(keep_vectors),                                                                  \
-    "do not turn velocities and other vectors when that is a rotation")                                                       \
-  X(CHECK, 0, "check", NULL, AT(check), "transfer known fields and say how well: PASS or FAIL; no OUTPUT")                    \
-  X(SUPERMESH, 0, "supermesh", "FILE", AT(supermesh),                                                                         \
-    "write the common parts of the cells too, as polyhedra with their\nancestors: CGNS, or VTK if FILE ends in .vtu")         \
-  X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                  \
-  X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                         \
-  X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                                \
-  X(VERBOSE, 'v', "verbose", NULL, AT(verbose), "print zones and what the library says too")                                  \
-  X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                            \
+#define OPTION_LIST(X)                                                                                                       \
+  X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                     \
+  X(NATURE, 0, "nature", "NAME=NATURE,...", CLI_OTHER,                                                                       \
+    "what fields are: conserved, mass-specific, volume-mean or flag;\nglobs; may be repeated; default by their SIDS names")  \
+  X(GAMMA, 0, "gamma", "RATIO", CLI_OTHER,                                                                                   \
+    "ratio of specific heats, to carry pressure as energy; default what\nFlowEquationSet or ReferenceState of SOURCE says")  \
+  X(ALLOW_NAN, 0, "allow-nan", NULL, AT(allow_nan), "let values that are no numbers pass: they spoil the cells they reach")  \
+  X(ORDER, 0, "order", "1|2|3", CLI_OTHER, "accuracy of the transfer; default 2")                                            \
+  X(LIMITER, 0, "limiter", "none|barth-jespersen|caas|auto", CLI_OTHER,                                                      \
+    "bounds on what is transferred; default auto\n(barth-jespersen where a field is not smooth)")                            \
+  X(FACES, 0, "faces", "centre|diagonal", CLI_OTHER, "how faces become triangles; default centre")                           \
+  X(ON_UNCOVERED, 0, "on-uncovered", "keep|nearest|fill=VALUE|error", CLI_OTHER,                                             \
+    "cells that SOURCE does not meet; default keep\n(nearest where there is no old value)")                                  \
+  X(ON_PARTIAL, 0, "on-partial", "blend|normalise|conserve|error", CLI_OTHER,                                                \
+    "cells that SOURCE covers in part; default blend\n(normalise where there is no old value)")                              \
+  X(MIN_COVERAGE, 0, "min-coverage", "SHARE", CLI_OTHER,                                                                     \
+    "cells that are covered less than this count as not covered; default 0")                                                 \
+  X(COVERAGE, 0, "coverage", NULL, AT(coverage), "write how much of each cell SOURCE covers too, as field Coverage")         \
+  X(SOURCE_COVERAGE, 0, "source-coverage", "FILE", AT(source_coverage),                                                      \
+    "write SOURCE with how much of each of its cells TARGET covers")                                                         \
+  X(SOURCE_MASK, 0, "source-mask", "FIELD[=CODES]", AT(mask[REMAP_SOURCE]),                                                  \
+    "take values only where this field of SOURCE says 'computed':\ncellN 1, Iblank above 0, others not 0, or CODES such as " \
+    "1+2")                                                                                                                   \
+  X(TARGET_MASK, 0, "target-mask", "FIELD[=CODES]", AT(mask[REMAP_TARGET]),                                                  \
+    "write values only where this field of TARGET says 'no hole':\nnot 0, or CODES")                                         \
+  X(PRIORITY, 0, "priority", "BASE/ZONE,...", AT(priority),                                                                  \
+    "zones that overlap, the highest first, globs: what they hide of\nothers does not count; TARGET's cells get values one " \
+    "by one")                                                                                                                \
+  X(SOURCE_VOLUME, 0, "source-volume", "FIELD", AT(volume[REMAP_SOURCE]),                                                    \
+    "conserve what SOURCE's solver integrates, with its own cell volumes")                                                   \
+  X(TARGET_VOLUME, 0, "target-volume", "FIELD", AT(volume[REMAP_TARGET]), "likewise what TARGET's solver integrates")        \
+  X(LOCATION, 0, "location", "cell|vertex", CLI_OTHER,                                                                       \
+    "where fields are, in both files; default cell; vertex takes the\ncells of the median-dual mesh about the vertices")     \
+  X(SOLUTION, 0, "solution", "NAME", AT(solution), "the FlowSolution_t of SOURCE to take; default the only one there is")    \
+  X(STEP, 0, "step", "N|last", CLI_OTHER, "or the one of a time step, counted from 1")                                       \
+  X(OUTPUT_SOLUTION, 0, "output-solution", "NAME", AT(output_solution),                                                      \
+    "the FlowSolution_t to write; default the source's name")                                                                \
+  X(SOURCE_BASE, 0, "source-base", "NAME", AT(base[REMAP_SOURCE]), "read this base of SOURCE only")                          \
+  X(TARGET_BASE, 0, "target-base", "NAME", AT(base[REMAP_TARGET]), "read this base of TARGET only")                          \
+  X(SCALE, 0, "scale", "FACTOR", CLI_OTHER, "multiply SOURCE's coordinates first")                                           \
+  X(TRANSFORM, 0, "transform", "FILE", AT(transform), "then move them: x' = A x + b, FILE holds the 3 rows of [A | b]")      \
+  X(KEEP_VECTORS, 0, "keep-vectors", NULL, AT(keep_vectors),                                                                 \
+    "do not turn velocities and other vectors when that is a rotation")                                                      \
+  X(CHECK, 0, "check", NULL, AT(check), "transfer known fields and say how well: PASS or FAIL; no OUTPUT")                   \
+  X(SUPERMESH, 0, "supermesh", "FILE", AT(supermesh),                                                                        \
+    "write the common parts of the cells too, as polyhedra with their\nancestors: CGNS, or VTK if FILE ends in .vtu")        \
+  X(REPORT, 0, "report", "FILE", AT(report), "write the report as JSON too")                                                 \
+  X(OUTPUT, 'o', "output", "OUTPUT", AT(output), "the file to write: TARGET and the fields, as HDF5")                        \
+  X(QUIET, 'q', "quiet", NULL, AT(quiet), "print neither report nor progress")                                               \
+  X(VERBOSE, 'v', "verbose", NULL, AT(verbose), "print zones and what the library says too")                                 \
+  X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                           \
   X(HELP, 'h', "help", NULL, AT(help), "print this text")
 
 enum option_key {
@@ -85,22 +75,20 @@ enum option_key {
       END_KEY
 };
 
-#define OTHER SIZE_MAX
-
-typedef struct option_row {
-  int         key;
-  char        letter;
-  const char *name, *argument;
-  size_t      at; /* of a const char * if there is an argument, else of a bool; OTHER: parse_value knows */
-  const char *text;
-} option_row;
-
-static const option_row rows[] = {
+static const cli_row rows[] = {
 #define X(key, letter, name, argument, at, text) {KEY_##key, letter, name, argument, at, text},
     OPTION_LIST(X)
 #undef X
 };
-enum { NUM_ROWS = sizeof rows / sizeof *rows };
+
+static cli_exit parse_value(void *options, const cli_row *row, const char *argument, cli_failure *why);
+static cli_exit add_path(void *options, const char *path, cli_failure *why);
+
+static const cli_command command = {.name     = "remap",
+                                    .num_rows = sizeof rows / sizeof *rows,
+                                    .row      = rows,
+                                    .take     = parse_value,
+                                    .word     = add_path};
 
 /* A word of the command line and its value; lists end with a NULL word. */
 typedef struct word {
@@ -160,20 +148,7 @@ void cli_options_help(FILE *out)
         "remap [options] --check SOURCE TARGET\n\n"
         "Transfer the cell-centred fields of the CGNS file SOURCE to the mesh of the CGNS file TARGET, conservatively.\n\n",
         out);
-  for (int i = 0; i < NUM_ROWS; i++) {
-    const option_row *row  = &rows[i];
-    const char       *text = row->text, *end = strchr(text, '\n');
-    int               width;
-
-    if (row->letter)
-      width = fprintf(out, "  -%c, --%s", row->letter, row->name);
-    else
-      width = fprintf(out, "      --%s", row->name);
-    if (row->argument) width += fprintf(out, " %s", row->argument);
-    if (width > 34) width = fprintf(out, "\n") - 1;
-    fprintf(out, "%*s  %.*s\n", 34 - width, "", end ? (int)(end - text) : (int)strlen(text), text);
-    if (end) fprintf(out, "%36s%s\n", "", end + 1);
-  }
+  cli_command_help(&command, 36, out);
   fputs("\nExit status:\n", out);
 #define X(name, number, text) fprintf(out, "  %d  %s\n", number, text);
   CLI_EXIT_LIST(X)
@@ -182,7 +157,7 @@ void cli_options_help(FILE *out)
 
 /* ---- parsing ------------------------------------------------------------------------------------------------------ */
 
-static cli_exit pick(const word *words, const option_row *row, const char *argument, int *value, cli_failure *why)
+static cli_exit pick(const word *words, const cli_row *row, const char *argument, int *value, cli_failure *why)
 {
   for (const word *w = words; w->text; w++)
     if (!strcmp(w->text, argument)) {
@@ -192,21 +167,12 @@ static cli_exit pick(const word *words, const option_row *row, const char *argum
   return cli_fail(why, CLI_USAGE, "--%s: '%.200s' is not offered: give %s", row->name, argument, row->argument);
 }
 
-/* The whole of text as a number; false if it is none. */
-static bool number(const char *text, double *value)
-{
-  char *end;
-
-  *value = strtod(text, &end);
-  return end != text && !*end;
-}
-
-static cli_exit parse_uncovered(const option_row *row, const char *argument, remap_transfer *transfer, cli_failure *why)
+static cli_exit parse_uncovered(const cli_row *row, const char *argument, remap_transfer *transfer, cli_failure *why)
 {
   int value = 0;
 
   if (!strncmp(argument, "fill=", 5)) {
-    if (!number(argument + 5, &transfer->fill_value) || isinf(transfer->fill_value))
+    if (!cli_number(argument + 5, &transfer->fill_value) || isinf(transfer->fill_value))
       return cli_fail(why, CLI_USAGE, "--on-uncovered: '%.200s' is no number: give fill=VALUE", argument + 5);
     transfer->on_uncovered = REMAP_UNCOVERED_FILL;
     return CLI_DONE;
@@ -232,9 +198,10 @@ static cli_exit parse_step(const char *argument, int64_t *step, cli_failure *why
 }
 
 /* The options that are neither a mere text nor a flag. */
-static cli_exit parse_value(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
+static cli_exit parse_value(void *options, const cli_row *row, const char *argument, cli_failure *why)
 {
-  int value = 0;
+  cli_options *out   = options;
+  int          value = 0;
 
   switch (row->key) {
     case KEY_NATURE:
@@ -265,15 +232,15 @@ static cli_exit parse_value(const option_row *row, const char *argument, cli_opt
       break;
     case KEY_STEP: return parse_step(argument, &out->step, why);
     case KEY_SCALE:
-      if (!number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
+      if (!cli_number(argument, &out->scale) || !(out->scale > 0) || isinf(out->scale))
         return cli_fail(why, CLI_USAGE, "--scale: '%.200s' is no factor: give a positive number", argument);
       break;
     case KEY_GAMMA:
-      if (!number(argument, &out->gamma) || !(out->gamma > 1) || isinf(out->gamma))
+      if (!cli_number(argument, &out->gamma) || !(out->gamma > 1) || isinf(out->gamma))
         return cli_fail(why, CLI_USAGE, "--gamma: '%.200s' is no ratio of specific heats: give a number above 1", argument);
       break;
     case KEY_MIN_COVERAGE:
-      if (!number(argument, &out->min_coverage) || !(out->min_coverage >= 0 && out->min_coverage <= 1))
+      if (!cli_number(argument, &out->min_coverage) || !(out->min_coverage >= 0 && out->min_coverage <= 1))
         return cli_fail(why, CLI_USAGE, "--min-coverage: '%.200s' is no share: give a number from 0 to 1", argument);
       break;
     default: break;
@@ -281,40 +248,22 @@ static cli_exit parse_value(const option_row *row, const char *argument, cli_opt
   return CLI_DONE;
 }
 
-static cli_exit parse_one(const option_row *row, const char *argument, cli_options *out, cli_failure *why)
+static cli_exit add_path(void *options, const char *path, cli_failure *why)
 {
-  char *place = (char *)out + (row->at == OTHER ? 0 : row->at);
+  cli_options *out = options;
 
-  if (argument && !*argument) return cli_fail(why, CLI_USAGE, "--%s: its argument is empty: give %s", row->name, row->argument);
-  if (row->at == OTHER) return parse_value(row, argument, out, why);
-  if (row->argument)
-    memcpy(place, &argument, sizeof argument);
-  else
-    *(bool *)place = true;
-  return CLI_DONE;
-}
-
-/* The row of what getopt_long answered; NULL if it is none. */
-static const option_row *row_of(int key)
-{
-  for (int i = 0; i < NUM_ROWS; i++)
-    if (rows[i].key == key || (rows[i].letter && rows[i].letter == key)) return &rows[i];
-  return NULL;
-}
-
-static cli_exit add_path(cli_options *out, int *num_paths, const char *path, cli_failure *why)
-{
   if (!*path) return cli_fail(why, CLI_USAGE, "the name of a file is empty: give SOURCE TARGET -o OUTPUT");
-  if (*num_paths == 2)
+  if (out->num_paths == 2)
     return cli_fail(why, CLI_USAGE, "'%.200s' is one file too many: give SOURCE TARGET -o OUTPUT, see remap --help", path);
-  out->path[(*num_paths)++] = path;
+  out->path[out->num_paths++] = path;
   return CLI_DONE;
 }
 
 /* What fits together, once everything is read. */
-static cli_exit check_whole(const cli_options *out, int num_paths, cli_failure *why)
+static cli_exit check_whole(const cli_options *out, cli_failure *why)
 {
-  if (num_paths < 2) return cli_fail(why, CLI_USAGE, "two files are needed: give SOURCE TARGET -o OUTPUT, see remap --help");
+  if (out->num_paths < 2)
+    return cli_fail(why, CLI_USAGE, "two files are needed: give SOURCE TARGET -o OUTPUT, see remap --help");
   if (out->check && (out->output || out->source_coverage || out->supermesh))
     return cli_fail(why, CLI_USAGE, "--check writes no fields: leave -o and --source-coverage out");
   if (!out->check && !out->output) return cli_fail(why, CLI_USAGE, "no file to write: give -o OUTPUT, see remap --help");
@@ -323,43 +272,10 @@ static cli_exit check_whole(const cli_options *out, int num_paths, cli_failure *
   return CLI_DONE;
 }
 
-static cli_exit refuse(int key, const char *given, cli_failure *why)
-{
-  if (key != ':') /* getopt's word for a missing argument */
-    return cli_fail(why, CLI_USAGE, "option '%.200s' is unknown, ambiguous or takes no argument: see remap --help", given);
-  return cli_fail(why, CLI_USAGE, "option '%.200s' lacks its argument: see remap --help", given);
-}
-
 cli_exit cli_options_parse(int argc, char **argv, cli_options *out, cli_failure *why)
 {
-  struct option table[NUM_ROWS + 1]       = {{0}};
-  char          letters[2 * NUM_ROWS + 3] = "-:"; /* files come in order as 1; a missing argument comes as ':' */
-  int           key, num_paths = 0;
-
   *out = (cli_options){.scale = 1};
   remap_transfer_default(&out->transfer);
-  for (int i = 0; i < NUM_ROWS; i++) {
-    const char short_form[3] = {rows[i].letter, rows[i].argument ? ':' : '\0', '\0'};
-
-    table[i] = (struct option){rows[i].name, rows[i].argument ? required_argument : no_argument, NULL, rows[i].key};
-    strcat(letters, short_form);
-  }
-  opterr = 0;
-  optind = 1;
-  for (;;) {
-    const int         at  = optind;
-    const option_row *row = NULL;
-
-    if ((key = getopt_long(argc, argv, letters, table, NULL)) == -1) break;
-    if (key == 1) {
-      CLI_TRY(add_path(out, &num_paths, optarg, why));
-      continue;
-    }
-    row = row_of(key);
-    if (!row) return refuse(key, argv[at < argc ? at : argc - 1], why);
-    CLI_TRY(parse_one(row, optarg, out, why));
-  }
-  if (out->help || out->version) return CLI_DONE;
-  for (; optind < argc; optind++) CLI_TRY(add_path(out, &num_paths, argv[optind], why));
-  return check_whole(out, num_paths, why);
+  CLI_TRY(cli_command_parse(&command, argc, argv, out, why));
+  return out->help || out->version ? CLI_DONE : check_whole(out, why);
 }

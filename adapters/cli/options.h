@@ -15,6 +15,7 @@ enum { CLI_MAX_NATURES = 64 };
 /** What was asked for. Texts point into argv; NULL where an option was not given. */
 typedef struct cli_options {
   const char    *path[2]; /**< [remap_side] */
+  int            num_paths;
   const char    *output;
   const char    *report;
   const char    *fields; /**< names and globs, comma separated */

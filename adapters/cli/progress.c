@@ -8,6 +8,7 @@
 #include <time.h>
 
 struct cli_progress {
+  const char     *name;
   FILE           *out;
   double          seconds; /* between lines */
   struct timespec begin;
@@ -40,9 +41,9 @@ static void print_line(const cli_progress *progress)
   clock_gettime(CLOCK_MONOTONIC, &now);
   elapsed = (double)(now.tv_sec - progress->begin.tv_sec) + 1e-9 * (double)(now.tv_nsec - progress->begin.tv_nsec);
   if (progress->done < 0)
-    fprintf(progress->out, "remap: %.0f s: %s\n", elapsed, progress->phase);
+    fprintf(progress->out, "%s: %.0f s: %s\n", progress->name, elapsed, progress->phase);
   else
-    fprintf(progress->out, "remap: %.0f s: %s, %.0f %%\n", elapsed, progress->phase, 100 * progress->done);
+    fprintf(progress->out, "%s: %.0f s: %s, %.0f %%\n", progress->name, elapsed, progress->phase, 100 * progress->done);
   fflush(progress->out);
 }
 
@@ -62,12 +63,13 @@ static void *watch(void *data)
   return NULL;
 }
 
-cli_progress *cli_progress_start(FILE *out, double seconds)
+cli_progress *cli_progress_start(const char *name, FILE *out, double seconds)
 {
   cli_progress      *progress = calloc(1, sizeof *progress);
   pthread_condattr_t clock;
 
   if (!progress) return NULL;
+  progress->name    = name;
   progress->out     = out;
   progress->seconds = seconds;
   progress->done    = -1;

@@ -1,5 +1,7 @@
 /* report -- what the job found, as text and as JSON. Its numbers have 17 digits in JSON, so that they read back exactly. */
 #include "report.h"
+
+#include "command.h"
 #include "options.h"
 
 #include <errno.h>
@@ -327,8 +329,6 @@ static json_t *report_json(const cli_report *report)
 
 /* ---- the file ----------------------------------------------------------------------------------------------------- */
 
-static cli_exit no_memory(cli_failure *why) { return cli_fail(why, CLI_INTERNAL, "memory is out on one rank: use more ranks"); }
-
 /* What identifies the folder that path lies in; false if there is none. */
 static bool folder_of(const char *path, struct stat *out)
 {
@@ -365,7 +365,7 @@ cli_exit cli_report_open(const char *path, int num_others, const char *const *ot
   for (int i = 0; i < num_others; i++)
     if (cli_is_same_file(path, others[i]))
       return cli_fail(why, CLI_USAGE, "%s: it is used already: give --report another file", path);
-  if (!in_place && !(out->part = malloc(size))) return no_memory(why);
+  if (!in_place && !(out->part = malloc(size))) return cli_no_memory(why);
   if (out->part) snprintf(out->part, size, "%s.part", path);
   out->stream = fopen(in_place ? path : out->part, "w");
   if (!out->stream) {
@@ -394,7 +394,7 @@ cli_exit cli_report_commit(cli_report_file *file, const cli_report *report, cli_
 
   if (!json) {
     cli_report_discard(file);
-    return no_memory(why);
+    return cli_no_memory(why);
   }
   errno  = 0;
   ok     = json_dumpf(json, file->stream, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) == 0 && fputc('\n', file->stream) != EOF;

@@ -29,7 +29,7 @@ static void a_long_phase_is_told_again_and_again(void)
   int           lines = 0;
 
   if (!rt_all(RT_CHECK(out != NULL))) return;
-  progress = cli_progress_start(out, .05);
+  progress = cli_progress_start("remap", out, .05);
   RT_CHECK(progress != NULL);
   cli_progress_set(progress, "waiting", .25);
   sleep_for(.4);
@@ -47,7 +47,7 @@ static void a_share_nobody_knows_is_not_told(void)
   cli_progress *progress;
 
   if (!rt_all(RT_CHECK(out != NULL))) return;
-  progress = cli_progress_start(out, .05);
+  progress = cli_progress_start("remap", out, .05);
   cli_progress_set(progress, "reading", -1);
   sleep_for(.2);
   cli_progress_stop(progress);
@@ -61,7 +61,7 @@ static void a_short_job_is_silent_and_ends_at_once(void)
   const double begin = MPI_Wtime();
 
   if (!rt_all(RT_CHECK(out != NULL))) return;
-  cli_progress_stop(cli_progress_start(out, 60));
+  cli_progress_stop(cli_progress_start("remap", out, 60));
   RT_CHECK(MPI_Wtime() - begin < 30);
   RT_EQ(strlen(text_of(out, text, sizeof text)), 0);
 }

@@ -1,0 +1,60 @@
+/* command.h -- what the commands remap and remap-boolean share: a table of options that makes the parser and the help, agreement
+ * of ranks, failures of the CGNS adapter in their words. */
+#ifndef REMAP_CLI_COMMAND_H
+#define REMAP_CLI_COMMAND_H
+
+#include "cli.h"
+
+#include <cgns.h>
+#include <mpi.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+/** One option. */
+typedef struct cli_row {
+  int         key;             /**< distinct, above every letter */
+  char        letter;          /**< 0: it has none */
+  const char *name, *argument; /**< what its argument is called, NULL if it takes none */
+  size_t      at; /**< offset in the options of a const char * if there is an argument, else of a bool; CLI_OTHER: take knows */
+  const char *text; /**< what it does; a second line of help follows after \n */
+} cli_row;
+
+#define CLI_OTHER SIZE_MAX
+
+/** A command line: its options, and who hears of the rest. */
+typedef struct cli_command {
+  const char    *name; /**< of the command, for messages */
+  int            num_rows;
+  const cli_row *row; /**< [num_rows] */
+  cli_exit (*take)(void *options, const cli_row *row, const char *argument,
+                   cli_failure *why);                                  /**< an option that is CLI_OTHER */
+  cli_exit (*word)(void *options, const char *text, cli_failure *why); /**< a word that is no option */
+} cli_command;
+
+/** Read a command line into *options, as the rows say. The same on all ranks; not collective. Errors: USAGE, and what take and
+ *  word refuse. */
+cli_exit cli_command_parse(const cli_command *command, int argc, char **argv, void *options, cli_failure *why);
+
+/** A line or two for each option, texts from column `width` on. Not collective. */
+void cli_command_help(const cli_command *command, int width, FILE *out);
+
+/** The whole of a text as a number; false if it is none. Not collective. */
+int cli_number(const char *text, double *value);
+
+/** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
+cli_exit cli_agree_on(MPI_Comm comm, cli_exit mine, cli_failure *why);
+
+/** INTERNAL, with the words for it. Not collective. */
+cli_exit cli_no_memory(cli_failure *why);
+
+/** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
+cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why);
+
+/** Seconds since then, of the slowest rank. Collective. */
+double cli_slowest(MPI_Comm comm, double since);
+
+/** Bytes of the rank that has needed most. Collective. */
+int64_t cli_peak_rss(MPI_Comm comm);
+
+#endif
