@@ -3,7 +3,7 @@
  * Minimise sum over k of (w_k (g.d_k + H:(d_k d_k^T + Q_k) - du_k))^2, Q_k being the neighbour's mean of (x - c_k)(x - c_k)^T
  * less the cell's own, so that polynomial and data are compared by their means and quadratic fields come out exactly.
  * Everything is done in the axes in which the neighbours spread evenly, q = W d: so neither stretching nor rotation of a mesh
- * matters, and in directions that the neighbours do not span there is neither slope nor curvature. w_k = 1/|q_k|^3, so that
+ * matters, and in directions that the neighbours do not span there is neither slope nor curvature. w_k = |q_k|^-4.5, so that
  * near neighbours count more. Columns are scaled to unit length and orthogonalised twice, the longest that is left first; the
  * last one's length tells how well the neighbours determine the polynomial. O(n) time. */
 #include "field_private.h"
@@ -16,7 +16,7 @@ typedef struct factors {
   double scale[MOST], r[MOST][MOST]; /* r[p][c]: row of pivot p, column c */
 } factors;
 
-static const double WELL_CONDITIONED = 0.05; /* the least that a column of unit length may add to those before it */
+static const double WELL_CONDITIONED = 0.04; /* the least that a column of unit length may add to those before it */
 
 static double dot_columns(int64_t n, const double (*a)[MOST], int c, int e)
 {
@@ -130,7 +130,7 @@ bool rm_quadratic_weights(int64_t n, const double (*d)[3], const double (*spread
       q[a] = axes[a][0] * d[k][0] + axes[a][1] * d[k][1] + axes[a][2] * d[k][2];
       square += q[a] * q[a];
     }
-    room->row_weight[k] = square > 0.0 ? 1.0 / (square * sqrt(square)) : 0.0;
+    room->row_weight[k] = square > 0.0 ? 1.0 / (square * square * sqrt(sqrt(square))) : 0.0;
     for (int a = 0; a < dim; a++) {
       row[a] = room->row_weight[k] * q[a];
       for (int b = a; b < dim; b++)
