@@ -183,12 +183,15 @@ void rm_reconstruct(const rm_profile *profile, const rm_packing *packing, uint8_
 
 /* ---- smooth ---------------------------------------------------------------------------------------------------- */
 
-/* Slopes of all own cells, [giving cells][num_fields][3], scaled. Not collective. */
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[3]);
+/* Slopes of all own cells and, fourth, the range of values around them, [cells][num_fields][4], scaled. Not collective. */
+void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[4]);
 
 /* 1 for own cells that are rough, 0 for others, [giving cells][num_fields]. Not collective. */
 void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         const double (*slope)[3], const double (*halo_slope)[3], double *rough);
+                         const double (*slope)[4], const double (*halo_slope)[4], double *rough);
+
+/* Cells are smooth if none within so many layers of neighbours is rough. */
+enum { RM_ROUGH_LAYERS = 3 };
 
 /* 1 for own cells that are rough or have a rough neighbour, 0 for others, [giving cells][num_fields]. Not collective. */
 void rm_smooth_spread(const rm_stencil *stencil, const rm_packing *packing, rm_numbers rough, double *spread);
@@ -229,7 +232,7 @@ struct rm_profile {
   rm_ground ground;
   rm_flow   halo;               /* numbers around the stencils                                    */
   rm_flow   slopes, roughs;     /* likewise slopes and roughness, if smooth cells are told from others */
-  double (*slope)[3];           /* [cells][num_fields]                                            */
+  double (*slope)[4];           /* [cells][num_fields]                                            */
   double       *rough, *spread; /* [cells][num_fields] cells that are rough, and their neighbours too */
   uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
   const double *given;          /* [cells][num_fields] values as the caller has them              */

@@ -1,6 +1,6 @@
 /* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the
- * limiter auto slopes, then which cells are rough, twice; with systems a reduction over all ranks. O(neighbours) per cell and
- * field; 16 to 56 bytes per cell and field, 40 more for auto, 56 more for polynomials of degree 2. */
+ * limiter auto slopes, then which cells are rough, thrice; with systems a reduction over all ranks. O(neighbours) per cell and
+ * field; 16 to 56 bytes per cell and field, 48 more for auto, 56 more for polynomials of degree 2. */
 #include "field_private.h"
 
 void rm_word_add(rm_word *word, remap_status status)
@@ -74,7 +74,7 @@ remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, r
     mark_halo_cells(p->ground.stencil, p->needs_halo);
   }
   if (!load->is_checked) return REMAP_OK;
-  RM_TRY(rm_flow_init(arena, plan, stream, 3 * bytes, &p->slopes));
+  RM_TRY(rm_flow_init(arena, plan, stream, 4 * bytes, &p->slopes));
   RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->roughs));
   RM_NEW(p->slope, arena, rm_mul_sat(cells, n));
   RM_NEW(p->rough, arena, rm_mul_sat(cells, n));
@@ -103,7 +103,7 @@ void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packi
   }
 }
 
-/* Tell smooth cells from others: slopes of all around, then roughness of all around, and of all around them. */
+/* Tell smooth cells from others: slopes of all around, then roughness, layer after layer. */
 static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
   const rm_stencil *stencil = p->ground.stencil;
@@ -111,17 +111,20 @@ static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *pa
   const rm_numbers  numbers = {p->number, rm_flow_numbers(&p->halo)};
 
   if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope);
-  rm_word_post(word, comm, &p->slopes, 3 * bytes, p->slope);
+  rm_word_post(word, comm, &p->slopes, 4 * bytes, p->slope);
   rm_word_await(word, comm, &p->slopes);
   if (word->note.status == REMAP_OK)
-    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[3])p->slope,
-                        (const double(*)[3])(const void *)p->slopes.received, p->rough);
+    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[4])p->slope,
+                        (const double(*)[4])(const void *)p->slopes.received, p->rough);
   rm_word_post(word, comm, &p->roughs, bytes, p->rough);
   rm_word_await(word, comm, &p->roughs);
-  if (word->note.status == REMAP_OK)
-    rm_smooth_spread(stencil, packing, (rm_numbers){p->rough, rm_flow_numbers(&p->roughs)}, p->spread);
-  rm_word_post(word, comm, &p->roughs, bytes, p->spread);
-  rm_word_await(word, comm, &p->roughs);
+  for (int layer = 1; layer < RM_ROUGH_LAYERS; layer++) {
+    double *from = layer % 2 ? p->rough : p->spread, *to = layer % 2 ? p->spread : p->rough;
+
+    if (word->note.status == REMAP_OK) rm_smooth_spread(stencil, packing, (rm_numbers){from, rm_flow_numbers(&p->roughs)}, to);
+    rm_word_post(word, comm, &p->roughs, bytes, to);
+    rm_word_await(word, comm, &p->roughs);
+  }
 }
 
 /* The least and the greatest number of every field anywhere. Collective. */

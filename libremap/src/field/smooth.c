@@ -4,19 +4,20 @@
  * distance: to the second at walls and on uneven meshes. At a jump it errs by a part of the jump, about one half. So a cell is
  * as rough as
  *
- *   max over k of |u_k - u - (g + g_k).d_k / 2|  /  max over k of |u_k - u|,
+ *   max over k of |u_k - u - (g + g_k).d_k / 2|  /  max over k of R_k,
  *
- * which is of the first order of the cells' size where the slope is not 0, of the same order at smooth extrema (there both fall
- * with the square of the size) if slopes are good to second order, and 1/4 to 1/2 beside jumps, however small those are. A cell
- * is smooth if no cell within two layers of neighbours is rougher than a threshold below that: a jump of one and a half cells
- * before a wall looks linear from the wall, and is rough only on its far side.
+ * R_k being the range of values around neighbour k. It is of the first order of the cells' size where the slope is not 0. At
+ * smooth extrema numerator and range fall with the square of the size; slopes on uneven meshes err by as much there, and it is
+ * that R_k looks one layer farther which keeps the quotient small. Somewhere within two layers of a jump it is 1/4 to 1/2,
+ * however small the jump. A cell is smooth if no cell within three layers of neighbours is rougher than a threshold below that:
+ * a jump of one and a half cells before a wall looks linear from the wall, and is rough only on its far side.
  *
- * Slopes of other ranks' cells come in one exchange, roughness in two. O(neighbours) per cell and field. */
+ * Slopes and ranges of other ranks' cells come in one exchange, roughness in three. O(neighbours) per cell and field. */
 #include "field_private.h"
 
 static const double ROUGH = 0.2;
 
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[3])
+void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[4])
 {
   const int num = packing->num_fields;
 
@@ -27,12 +28,13 @@ void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_n
 
       if (packing->order[f] > 1) rm_fit_slope(stencil, c, &u, g, bounds);
       if (packing->order[f] > 2) (void)rm_fit_quadratic(stencil, c, &u, g, curvature);
+      if (packing->order[f] > 1) g[3] = bounds[1] - bounds[0];
     }
 }
 
 /* Is a cell rough in field number f? */
 static bool is_rough(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, int f, int num, const rm_around *u,
-                     const double (*slope)[3], const double (*halo_slope)[3])
+                     const double (*slope)[4], const double (*halo_slope)[4])
 {
   const double  value = rm_value_at(u, stencil->num_cells, cell);
   const double *c = mesh->cell_centroid[cell], *g = slope[(int64_t)cell * num + f];
@@ -48,13 +50,13 @@ static bool is_rough(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell
 
     for (int d = 0; d < 3; d++) told += 0.5 * (g[d] + other[d]) * (x[d] - c[d]);
     error = fmax(error, fabs(rise - told));
-    range = fmax(range, fabs(rise));
+    range = fmax(range, other[3]);
   }
   return error > ROUGH * range;
 }
 
 void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         const double (*slope)[3], const double (*halo_slope)[3], double *rough)
+                         const double (*slope)[4], const double (*halo_slope)[4], double *rough)
 {
   const int num = packing->num_fields;
 
