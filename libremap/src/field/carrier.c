@@ -74,10 +74,10 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
 /* All memory that transfers need. Not collective. */
 static remap_status make_room(rm_arena *arena, rm_carrier *c)
 {
-  const rm_transfer_setup *setup = &c->setup;
-  const int                n     = c->load.num_fields;
+  const rm_transfer_setup *setup  = &c->setup;
+  const int                n      = c->load.num_fields;
   const int                stream = (int)setup->giving->side; /* transfers either way may be under way at once */
-  const size_t             bytes = (size_t)n * sizeof(double);
+  const size_t             bytes  = (size_t)n * sizeof(double);
 
   RM_TRY(make_packing(arena, &c->load, &c->packing));
   RM_NEW(c->given, arena, rm_mul_sat(setup->giving->num_cells, n));
@@ -222,8 +222,9 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   RM_ASSERT(!c->is_under_way && rm_load_covers(c->load, rm_load_of(&c->setup, how, num_fields, fields)));
   c->is_under_way = true;
   c->how          = *how;
-  c->word         = (rm_word){{mark, (int32_t)mine, 0, 0}, mine, *reason, c->next.peers ? c->next : c->word.parley, false, false, false};
-  c->next.peers   = NULL;
+  c->word =
+      (rm_word){{mark, (int32_t)mine, 0, 0}, mine, *reason, c->next.peers ? c->next : c->word.parley, false, false, false};
+  c->next.peers = NULL;
   for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
   rm_packing_fill(&c->packing, &c->setup, &c->how, num_fields, c->fields);
   if (mine == REMAP_OK) rm_word_add(&c->word, gather(c));

@@ -165,7 +165,8 @@ static bool is_fraction(const rm_packing *packing, int f)
 
 static bool is_smooth_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, int f)
 {
-  const rm_around rough = rm_around_of((rm_numbers){RM_ROUGH_LAYERS % 2 ? w->rough : w->spread, rm_flow_numbers(&w->roughs)}, f, packing->num_fields);
+  const rm_around rough = rm_around_of((rm_numbers){RM_ROUGH_LAYERS % 2 ? w->rough : w->spread, rm_flow_numbers(&w->roughs)}, f,
+                                       packing->num_fields);
 
   return packing->is_checked && rm_is_smooth(w->ground.stencil, cell, &rough);
 }
