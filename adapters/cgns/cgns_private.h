@@ -53,6 +53,9 @@ rcgns_status rc_fail(rcgns_message *message, rcgns_status status, const char *fo
 /* MEMORY, with the words for it. */
 rcgns_status rc_no_memory(rcgns_message *message);
 
+/* What a public function ends with: status, and where memory ran out the file's name in front of the message. */
+rcgns_status rc_name_file(const char *path, rcgns_status status, rcgns_message *message);
+
 /* The greatest of the ranks' statuses and the message of the lowest rank that has it. Collective. */
 rcgns_status rc_agree(MPI_Comm comm, rcgns_status mine, rcgns_message *message);
 

@@ -44,6 +44,15 @@ rcgns_status rc_no_memory(rcgns_message *message)
   return rc_fail(message, RCGNS_MEMORY, "out of memory while reading or writing CGNS: use more ranks or nodes");
 }
 
+rcgns_status rc_name_file(const char *path, rcgns_status status, rcgns_message *message)
+{
+  const rcgns_message plain = *message;
+  const size_t        n     = strlen(path);
+
+  if (status != RCGNS_MEMORY || (!strncmp(plain.text, path, n) && plain.text[n] == ':')) return status;
+  return rc_fail(message, status, "%s: %.900s", path, plain.text);
+}
+
 rcgns_status rc_agree(MPI_Comm comm, rcgns_status mine, rcgns_message *message)
 {
   struct {

@@ -248,10 +248,11 @@ rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *op
 {
   rcgns_file   *file = calloc(1, sizeof *file);
   rcgns_options plain;
-  rcgns_status  status = file && (file->path = strdup(path)) ? RCGNS_OK : rc_no_memory(message);
+  rcgns_status  status = RCGNS_OK;
 
   *out             = NULL;
   message->text[0] = 0;
+  if (!file || !(file->path = strdup(path))) status = rc_no_memory(message);
   if (file) file->comm = MPI_COMM_NULL;
   status = rc_agree(comm, status, message);
   if (status == RCGNS_OK) {
@@ -265,7 +266,7 @@ rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *op
     *out = file;
   else
     rcgns_close(&file);
-  return status;
+  return rc_name_file(path, status, message);
 }
 
 const rcgns_info *rcgns_get_info(const rcgns_file *file) { return &file->info; }

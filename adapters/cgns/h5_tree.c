@@ -435,6 +435,20 @@ static bool select_range(hid_t space, const rc_box *box, int64_t lo, int64_t hi)
   return ok;
 }
 
+static herr_t look_for_memory(unsigned n, const H5E_error2_t *error, void *found)
+{
+  (void)n;
+  if (error->maj_num == H5E_RESOURCE || error->min_num == H5E_NOSPACE || error->min_num == H5E_CANTALLOC) *(bool *)found = true;
+  return 0;
+}
+
+/* ok, of HDF5's last call; *is_short becomes true if it failed because it got no memory. */
+static bool judged(bool ok, bool *is_short)
+{
+  if (!ok) H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, look_for_memory, is_short);
+  return ok;
+}
+
 rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
                         void *out, rcgns_message *message)
 {
@@ -442,22 +456,21 @@ rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, cons
   const size_t  size  = strlen(path) + sizeof "/ data";
   char         *name  = malloc(size);
   hid_t         data = -1, space = -1, memory = -1;
-  bool          ok = name != NULL;
+  bool          ok, is_short = false;
 
-  if (ok) {
-    snprintf(name, size, "%s/ data", path);
-    QUIETLY(data = H5Dopen2((hid_t)handle, name, H5P_DEFAULT));
-    ok = data >= 0;
-  }
+  if (!name) return rc_no_memory(message);
+  snprintf(name, size, "%s/ data", path);
+  QUIETLY(ok = judged((data = H5Dopen2((hid_t)handle, name, H5P_DEFAULT)) >= 0, &is_short));
   if (ok) {
     space  = H5Dget_space(data);
     memory = H5Screate_simple(1, &count, NULL);
     ok     = H5Sget_simple_extent_ndims(space) == box->nd && select_range(space, box, lo, hi);
-    if (ok) QUIETLY(ok = H5Dread(data, memory_type(as, type), memory, space, H5P_DEFAULT, out) >= 0);
+    if (ok) QUIETLY(ok = judged(H5Dread(data, memory_type(as, type), memory, space, H5P_DEFAULT, out) >= 0, &is_short));
     H5Sclose(memory);
     H5Sclose(space);
     H5Dclose(data);
   }
   free(name);
+  if (is_short) return rc_no_memory(message);
   return ok ? RCGNS_OK : rc_fail(message, RCGNS_IO, "cannot read the array %s: is the file complete?", path);
 }

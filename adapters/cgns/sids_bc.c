@@ -383,7 +383,7 @@ rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgn
   if (status != RCGNS_OK) {
     free(file->face_boundary);
     file->face_boundary = NULL;
-    return status;
+    return rc_name_file(file->path, status, message);
   }
   *out = (rcgns_boundaries){.num  = (int)file->boundary_name.count,
                             .name = file->boundary_name.item,

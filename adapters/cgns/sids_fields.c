@@ -457,7 +457,7 @@ rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values
   status = rc_agree(file->comm, status, message);
   if (status == RCGNS_OK) status = read_arrays(file, array, values, message);
   free(array);
-  return status;
+  return rc_name_file(file->path, status, message);
 }
 
 /* ---- fields of any node ------------------------------------------------------------------------------------------- */
@@ -508,5 +508,5 @@ rcgns_status rcgns_read_cells(rcgns_file *file, const char *name, double *values
   status = rc_agree(file->comm, status, message);
   if (status == RCGNS_OK) status = read_arrays(file, array, values, message);
   free(array);
-  return status;
+  return rc_name_file(file->path, status, message);
 }

@@ -351,6 +351,9 @@ static rcgns_status check_path(const rcgns_file *file, const char *path, rcgns_m
   } else if (errno != ENOENT) {
     status = rc_fail(message, RCGNS_IO, "%s: %s: choose another output", path, strerror(errno));
   }
+  if (status == RCGNS_OK && rslice_file_check(path))
+    status = rc_fail(message, RCGNS_IO, "%s: it may not be written (%s): remove it, or choose another output", path,
+                     strerror(rslice_file_check(path)));
   if (status == RCGNS_OK && slash && !slash[1]) status = rc_fail(message, RCGNS_IO, "%s: it is a folder: give a file", path);
   if (status == RCGNS_OK && access(folder, W_OK | X_OK))
     status = rc_fail(message, RCGNS_IO, "%s: its folder cannot be written (%s): choose another output", path, strerror(errno));
@@ -380,7 +383,8 @@ rcgns_status rc_begin(const rc_plan *plan, const char *path, char *part, size_t 
   rcgns_message why = {""};
 
   RC_TRY(cannot_write(path, rslice_file_begin(path, part, size), message));
-  return rc_h5_skeleton(part, plan, &why) == RCGNS_OK ? RCGNS_OK : rc_fail(message, RCGNS_IO, "%s: %.900s", path, why.text);
+  const rcgns_status status = rc_h5_skeleton(part, plan, &why);
+  return status == RCGNS_OK ? status : rc_fail(message, status, "%s: %.900s", path, why.text);
 }
 
 rcgns_status rc_finish(const char *part, const char *path, rcgns_message *message)
@@ -418,5 +422,5 @@ rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solutio
   if (status == RCGNS_OK) status = rc_agree(file->comm, make_plan(&c), message);
   if (status == RCGNS_OK) status = rc_write_plan(file, &plan, path, fields, message);
   rc_plan_drop(&plan);
-  return status;
+  return rc_name_file(path, status, message);
 }

@@ -408,6 +408,8 @@ cli_exit cli_report_commit(cli_report_file *file, const cli_report *report, cli_
     file->part = NULL;
   }
   cli_report_discard(file);
-  if (!ok) return cli_fail(why, CLI_IO, "%s: the report cannot be written: %s", file->path, strerror(number));
-  return CLI_DONE;
+  if (ok) return CLI_DONE;
+  return cli_fail(why, CLI_IO, "%s: the report cannot be written: %s%s%s%s", file->path, strerror(number),
+                  report->output ? "; " : "", report->output ? report->output : "",
+                  report->output ? " is written and complete" : "");
 }

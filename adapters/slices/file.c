@@ -3,16 +3,43 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
+/* Where a file of that name is to be. 0, or an error number. */
+static int find_place(const char *path, char place[PATH_MAX])
+{
+  struct stat there;
+  bool        exists = !lstat(path, &there);
+
+  if (strlen(path) >= PATH_MAX) return ENAMETOOLONG;
+  strcpy(place, path);
+  if (exists && S_ISLNK(there.st_mode) && (!realpath(path, place) || stat(place, &there))) return errno;
+  return exists && S_ISREG(there.st_mode) && !(there.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) ? EACCES : 0;
+}
+
+int rslice_file_check(const char *path)
+{
+  char place[PATH_MAX];
+
+  return find_place(path, place);
+}
 
 int rslice_file_begin(const char *path, char *part, size_t size)
 {
-  int file = -1;
+  char      place[PATH_MAX];
+  const int error = find_place(path, place);
+  int       file  = -1;
 
+  part[0] = 0;
+  if (error) return error;
   for (int i = 0; i < 100 && file < 0; i++) {
-    if ((size_t)snprintf(part, size, "%s.part-%ld-%d", path, (long)getpid(), i) >= size) {
+    if ((size_t)snprintf(part, size, "%s.part-%ld-%d", place, (long)getpid(), i) >= size) {
       errno = ENAMETOOLONG;
       break;
     }
@@ -29,11 +56,13 @@ int rslice_file_begin(const char *path, char *part, size_t size)
 
 int rslice_file_finish(const char *part, const char *path)
 {
-  const int file = open(part, O_RDWR | O_CLOEXEC);
-  bool      ok   = file >= 0 && !fsync(file);
+  char      place[PATH_MAX];
+  const int error = find_place(path, place), file = error ? -1 : open(part, O_RDWR | O_CLOEXEC);
+  bool      ok = file >= 0 && !fsync(file);
 
+  if (error) return error;
   if (file >= 0) ok = !close(file) && ok;
-  return ok && !rename(part, path) ? 0 : errno;
+  return ok && !rename(part, place) ? 0 : errno;
 }
 
 int rslice_file_claim(const char *part, int64_t bytes)

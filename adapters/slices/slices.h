@@ -86,11 +86,16 @@ rslice_status rslice_cells(MPI_Comm comm, const rslice_content *content, int wit
 /** Words of such a row before the faces. Not collective. */
 int64_t rslice_cell_head(const rslice_content *content);
 
-/** A new, empty file beside `path`, that is to get its name; its own goes to part. One rank calls. 0, or an error number. */
+/** May a file of that name be written? One without any write permission is not replaced, not even by root, nor is a link that
+ *  leads nowhere. Not collective. 0, or an error number. */
+int rslice_file_check(const char *path);
+/** A new, empty file beside `path`, or beside what it links to, that is to get its name; its own goes to part. One rank calls. 0,
+ *  or an error number. */
 int rslice_file_begin(const char *path, char *part, size_t size);
 /** Claim so many bytes of disk, so that later writes cannot find it full. One rank calls. 0, or an error number. */
 int rslice_file_claim(const char *part, int64_t bytes);
-/** Bring the file to the disk and give it its name. One rank calls. 0, or an error number. */
+/** Bring the file to the disk and give it its name; a link stays, and what it links to is replaced. One rank calls. 0, or an
+ *  error number. */
 int rslice_file_finish(const char *part, const char *path);
 
 #ifdef __cplusplus

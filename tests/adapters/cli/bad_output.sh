@@ -31,6 +31,28 @@ refused 5 word.txt "a transform with a word in it is refused" good.cgns mesh.cgn
 refused 5 "out/absent/result.cgns" "a folder that is not there takes no OUTPUT" good.cgns mesh.cgns -o out/absent/result.cgns
 refused 5 "$closed/result.cgns" "a folder that may not be written takes no OUTPUT" good.cgns mesh.cgns -o "$closed/result.cgns"
 refused 5 "/dev/full" "a device is no OUTPUT" good.cgns mesh.cgns -o /dev/full
+echo keep >locked.cgns
+chmod a-w locked.cgns
+refused 5 "locked.cgns.*may not be written" "an OUTPUT that nobody may write is left alone" good.cgns mesh.cgns -o locked.cgns
+rm -f locked.cgns
+ln -s absent/nowhere.cgns lost.cgns
+refused 5 "lost.cgns" "a link that leads nowhere is no OUTPUT" good.cgns mesh.cgns -o lost.cgns
+rm lost.cgns
+mkdir elsewhere
+echo old >elsewhere/real.cgns
+ln -s ../elsewhere/real.cgns out/link.cgns
+works 1 good.cgns mesh.cgns -o out/link.cgns
+[ -L out/link.cgns ] || complain "the link is gone"
+[ "$(head -c 3 elsewhere/real.cgns)" != old ] || complain "what it links to is as it was"
+[ "$(ls elsewhere)" = real.cgns ] || complain "something is left beside it"
+hold "$wrong" "a link stays, and what it links to becomes OUTPUT"
+rm -rf out/link.cgns elsewhere
+run 1 good.cgns mesh.cgns -o out/whole.cgns --report /dev/full
+[ "$code" = 5 ] || complain "exit status $code"
+grep -q "/dev/full.*out/whole.cgns is written and complete" "$work/stderr" || complain "$(cat "$work/stderr")"
+[ -s out/whole.cgns ] || complain "OUTPUT is not there"
+hold "$wrong" "a report that fails at the end is told, and that OUTPUT is there"
+rm -f out/whole.cgns
 refused 2 "good.cgns" "OUTPUT must not be SOURCE" good.cgns mesh.cgns -o good.cgns
 refused 2 "mesh.cgns" "OUTPUT must not be TARGET" good.cgns mesh.cgns -o ./mesh.cgns
 refused 5 "$closed/report.json" "a report that cannot be written is told first" \
