@@ -62,9 +62,12 @@ static void print_operand(FILE *out, char letter, const bool_operand *o)
   }
   fprintf(out, "a surface of %lld shells, %lld of them voids; %d groups\n", (long long)o->repairs.shells,
           (long long)o->repairs.voids, o->num_boundaries);
-  if (o->repairs.faces_dropped || o->repairs.faces_turned || o->repairs.faces_cut)
-    fprintf(out, "   repaired: %lld faces turned round, %lld without size dropped, %lld that are bent or concave cut\n",
-            (long long)o->repairs.faces_turned, (long long)o->repairs.faces_dropped, (long long)o->repairs.faces_cut);
+  if (o->repairs.faces_dropped || o->repairs.faces_turned || o->repairs.faces_cut || o->repairs.faces_flipped)
+    fprintf(out,
+            "   repaired: %lld faces turned round, %lld without size dropped, %lld without area flipped, %lld bent or concave "
+            "cut\n",
+            (long long)o->repairs.faces_turned, (long long)o->repairs.faces_dropped, (long long)o->repairs.faces_flipped,
+            (long long)o->repairs.faces_cut);
 }
 
 void bool_report_print(FILE *out, const bool_report *r)
@@ -106,10 +109,10 @@ static json_t *operand_json(const bool_operand *o)
 
   if (json && o->is_surface)
     json_object_set_new(json, "repairs",
-                        json_pack("{s:I, s:I, s:I, s:I, s:I}", "faces_turned", (json_int_t)o->repairs.faces_turned,
-                                  "faces_dropped", (json_int_t)o->repairs.faces_dropped, "faces_cut",
-                                  (json_int_t)o->repairs.faces_cut, "shells", (json_int_t)o->repairs.shells, "voids",
-                                  (json_int_t)o->repairs.voids));
+                        json_pack("{s:I, s:I, s:I, s:I, s:I, s:I}", "faces_flipped", (json_int_t)o->repairs.faces_flipped,
+                                  "faces_turned", (json_int_t)o->repairs.faces_turned, "faces_dropped",
+                                  (json_int_t)o->repairs.faces_dropped, "faces_cut", (json_int_t)o->repairs.faces_cut, "shells",
+                                  (json_int_t)o->repairs.shells, "voids", (json_int_t)o->repairs.voids));
   return json;
 }
 

@@ -98,6 +98,8 @@ int64_t rs_map_add(rs_map *map, const uint64_t *key)
   return map->slot[at];
 }
 
+int64_t rs_map_find(const rs_map *map, const uint64_t *key) { return map->num_slots ? map->slot[slot_of(map, key)] : -1; }
+
 void rs_map_drop(rs_map *map)
 {
   free(map->key.item);

@@ -266,15 +266,7 @@ rsurf_status rsurf_triangulate(rsurf_surface *s, rsurf_message *message)
 
 /* ---- edges ----------------------------------------------------------------------------------------------------------- */
 
-/* Sides of faces, numbered as in face_node: side i runs from that corner to the next one of its loop. */
-typedef struct edges {
-  rs_map   map;       /* its two nodes, the smaller one first */
-  int64_t *of_side;   /* [sides] edge */
-  int64_t (*side)[2]; /* [edges] the first two sides, -1: none */
-  int64_t *count;     /* [edges] sides */
-} edges;
-
-static void drop_edges(edges *e)
+void rs_edges_drop(rs_edges *e)
 {
   rs_map_drop(&e->map);
   free(e->of_side);
@@ -282,7 +274,7 @@ static void drop_edges(edges *e)
   free(e->count);
 }
 
-static bool find_edges(const rsurf_surface *s, edges *e)
+bool rs_find_edges(const rsurf_surface *s, rs_edges *e)
 {
   const int64_t num = s->face_offset[s->num_faces];
 
@@ -306,7 +298,7 @@ static bool find_edges(const rsurf_surface *s, edges *e)
 }
 
 /* How many edges have one side (open) or more than two, and where the first ones are. */
-static rsurf_status check_edges(const rsurf_surface *s, const edges *e, const char *name, rsurf_message *message)
+static rsurf_status check_edges(const rsurf_surface *s, const rs_edges *e, const char *name, rsurf_message *message)
 {
   int64_t num[2]                    = {0, 0};
   char    text[2][MOST_NAMED * 110] = {"", ""};
@@ -346,7 +338,7 @@ void rs_turn_face(rsurf_surface *s, int64_t face)
 }
 
 /* From each face to those beside it: which shell, and whether it must be turned. */
-static rsurf_status spread(const rsurf_surface *s, const edges *e, const char *name, int64_t *shell, int8_t *turned,
+static rsurf_status spread(const rsurf_surface *s, const rs_edges *e, const char *name, int64_t *shell, int8_t *turned,
                            int64_t *num_shells, rsurf_message *message)
 {
   int64_t *face_of = rs_alloc(s->face_offset[s->num_faces], sizeof *face_of), *stack = rs_alloc(s->num_faces, sizeof *stack);
@@ -430,7 +422,7 @@ static rsurf_status check_areas(const rsurf_surface *s, const double *xyz, const
 
 rsurf_status rsurf_repair(rsurf_surface *s, const char *name, rsurf_repairs *repairs, rsurf_message *message)
 {
-  edges         e         = {.count = NULL};
+  rs_edges      e         = {.count = NULL};
   rs_triangles  triangles = {.num = 0};
   double       *xyz       = unit_coordinates(s);
   int64_t      *shell     = NULL, num_shells;
@@ -440,9 +432,10 @@ rsurf_status rsurf_repair(rsurf_surface *s, const char *name, rsurf_repairs *rep
 
   if (status != RSURF_OK) goto done;
   RS_GOTO(done, status = clean_faces(s, xyz, name, &did, message));
+  RS_GOTO(done, status = rs_flip_caps(s, xyz, &did, message));
   shell  = rs_alloc(s->num_faces, sizeof *shell);
   turned = rs_alloc(s->num_faces, sizeof *turned);
-  RS_GOTO(done, status = shell && turned && find_edges(s, &e) ? RSURF_OK : rs_no_memory(message));
+  RS_GOTO(done, status = shell && turned && rs_find_edges(s, &e) ? RSURF_OK : rs_no_memory(message));
   RS_GOTO(done, status = check_edges(s, &e, name, message));
   RS_GOTO(done, status = spread(s, &e, name, shell, turned, &num_shells, message));
   for (int64_t f = 0; f < s->num_faces; f++)
@@ -454,7 +447,7 @@ rsurf_status rsurf_repair(rsurf_surface *s, const char *name, rsurf_repairs *rep
   *repairs         = did;
   message->text[0] = 0;
 done:
-  drop_edges(&e);
+  rs_edges_drop(&e);
   free(triangles.corner);
   free(triangles.face);
   free(shell);

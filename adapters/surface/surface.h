@@ -66,6 +66,7 @@ typedef struct rsurf_surface {
 typedef struct rsurf_repairs {
   int64_t faces_dropped; /**< two corners in one place: they bound nothing */
   int64_t faces_cut;     /**< polygons that are not flat and convex: cut into triangles */
+  int64_t faces_flipped; /**< corners on a line: the middle one split the longest side of the neighbour instead */
   int64_t faces_turned;  /**< turned round to agree with the faces beside them */
   int64_t shells;        /**< connected pieces of the surface */
   int64_t voids;         /**< shells inside of another one, whose inside is outside */
@@ -83,12 +84,12 @@ int rsurf_is_path(const char *path);
  *  corner that does not exist; the message says in which line or facet), MEMORY. */
 rsurf_status rsurf_read(const char *path, double scale, rsurf_surface *out, rsurf_message *message);
 
-/** Make of the faces the boundary of bodies, in place. Faces are turned to agree with their neighbours; each shell is turned
- *  by the exact sign of its volume and by how many shells it lies in: outward if that number is even, inward (a void) if it
- *  is odd. name is the file's, for messages. After a failure the surface can only be dropped.
- *  Errors: GEOMETRY (an edge with one face or with more than two, a face without area, a surface with one side only, a shell
- *  without volume, faces that cross or overlap; the message counts them and gives the coordinates of the first ones),
- *  MEMORY. */
+/** Make of the faces the boundary of bodies, in place. Triangles whose corners are on a line are flipped; faces are turned to
+ *  agree with their neighbours; each shell is turned by the exact sign of its volume and by how many shells it lies in:
+ *  outward if that number is even, inward (a void) if it is odd. name is the file's, for messages. After a failure the surface
+ *  can only be dropped. Errors: GEOMETRY (an edge with one face or with more than two, a face without area that cannot be
+ *  flipped, a surface with one side only, a shell without volume, faces that cross or overlap; the message counts them and
+ *  gives the coordinates of the first ones), MEMORY. */
 rsurf_status rsurf_repair(rsurf_surface *surface, const char *name, rsurf_repairs *repairs, rsurf_message *message);
 
 /** A repaired surface as remap_set_mesh wants it, a cell for each body: a view of the surface. */

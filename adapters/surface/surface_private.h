@@ -5,6 +5,7 @@
  *   stl.c      STL, binary and text
  *   obj.c      OBJ
  *   repair.c   rsurf_repair: edges, orientation
+ *   caps.c     triangles whose corners are on a line
  *   shells.c   shells: volume, nesting, bodies
  *   cross.c    faces that cross or overlap
  *   tree.c     boxes
@@ -59,6 +60,8 @@ typedef struct rs_map {
 
 /* Index of the key, which is added if new; -1: no memory. */
 int64_t rs_map_add(rs_map *map, const uint64_t *key);
+/* Index of the key, -1: it is not there. */
+int64_t rs_map_find(const rs_map *map, const uint64_t *key);
 void    rs_map_drop(rs_map *map);
 
 /* ---- reading ------------------------------------------------------------------------------------------------------- */
@@ -103,6 +106,20 @@ typedef struct rs_triangles {
   int64_t (*corner)[3]; /* [num] nodes */
   int64_t *face;        /* [num] */
 } rs_triangles;
+
+/* Sides of faces, numbered as in face_node: side i runs from that corner to the next one of its loop. */
+typedef struct rs_edges {
+  rs_map   map;       /* its two nodes, the smaller one first */
+  int64_t *of_side;   /* [sides] edge */
+  int64_t (*side)[2]; /* [edges] the first two sides, -1: none */
+  int64_t *count;     /* [edges] sides */
+} rs_edges;
+
+/* false: no memory; then too the edges must be dropped. */
+bool rs_find_edges(const rsurf_surface *surface, rs_edges *e);
+void rs_edges_drop(rs_edges *e);
+/* Triangles whose corners are on a line lend their middle corner to the neighbour, where that can be. */
+rsurf_status rs_flip_caps(rsurf_surface *surface, const double *xyz, rsurf_repairs *repairs, rsurf_message *message);
 
 /* Flat convex polygons as fans. The caller frees corner and face. false: no memory. */
 bool rs_fan(const rsurf_surface *surface, rs_triangles *out);

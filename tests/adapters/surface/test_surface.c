@@ -336,6 +336,38 @@ static void faces_that_collapse_are_dropped(void)
   rsurf_drop(&s);
 }
 
+static void a_triangle_on_a_line_lends_its_corner_to_the_neighbour(void)
+{
+  rsurf_surface s;
+  rsurf_repairs did;
+
+  /* a tetrahedron, one edge of which has a node in the middle on one side only; the cap comes in every rotation and way */
+  for (int i = 0; i < 6; i++) {
+    static const char *const cap[6] = {"f 1 2 3", "f 2 3 1", "f 3 1 2", "f 3 2 1", "f 2 1 3", "f 1 3 2"};
+    char                     text[300];
+
+    snprintf(text, sizeof text,
+             "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 1\ng cap\n%s\ng body\nf 1 2 4\nf 2 3 4\nf 1 4 5\nf 4 3 5\n"
+             "f 3 1 5\n",
+             cap[i]);
+    RT_EQ(body(text, &s, &did), RSURF_OK);
+    RT_EQ(did.faces_flipped, 1);
+    RT_EQ(s.num_faces, 6);
+    RT_EQ(s.face_group[0], 1);
+    RT_NEAR(six_volumes(&s), 2, 1e-15);
+    rsurf_drop(&s);
+  }
+  /* two nodes on that edge: the caps form a fan, of which only one at a time can be flipped */
+  RT_EQ(body("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 4\nf 2 3 4\nf 2 1 5\nf 3 2 5\nf 4 3 5\nf 1 6 5\nf 4 "
+             "5 6\n"
+             "f 1 4 6\n",
+             &s, &did),
+        RSURF_OK);
+  RT_EQ(did.faces_flipped, 2);
+  RT_NEAR(six_volumes(&s), 3, 1e-14);
+  rsurf_drop(&s);
+}
+
 /* ---- refused --------------------------------------------------------------------------------------------------------- */
 
 static void open_surfaces_are_refused_with_their_edges(void)
@@ -419,8 +451,9 @@ static void two_bodies_may_not_overlap_in_a_plane(void)
 static void shells_and_faces_without_size_are_refused(void)
 {
   refused("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n", "crosses itself");
-  refused("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 4 5\nf 4 3 5\nf 3 1 5\n",
-          "(0 0 0)(1 0 0)(2 0 0) has no area");
+  refused(
+      "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 1\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 4 5\nf 4 3 6\nf 4 6 5\nf 3 1 5 6\n",
+      "(0 0 0)(1 0 0)(2 0 0) has no area"); /* the neighbour is no triangle */
   refused("v 0 0 0\nv 1 0 0\nv 0 0 0\nf 1 2 3\n", "points or lines");
   refused("v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n", "crosses itself");
   refused("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4 5 3\n", "corner twice");
@@ -463,8 +496,8 @@ RT_MAIN(RT_CASE(binary_stl_is_known_by_its_length_and_read_exactly), RT_CASE(bin
         RT_CASE(obj_corners_come_in_every_form), RT_CASE(obj_that_is_damaged_is_refused_with_its_line),
         RT_CASE(faces_are_turned_to_agree_and_point_out), RT_CASE(a_shell_in_a_shell_is_a_void_and_one_in_the_void_a_body),
         RT_CASE(shells_may_share_a_corner), RT_CASE(flat_convex_polygons_stay_and_others_are_cut),
-        RT_CASE(faces_that_collapse_are_dropped), RT_CASE(open_surfaces_are_refused_with_their_edges),
-        RT_CASE(edges_of_many_faces_are_refused_with_their_place), RT_CASE(a_surface_with_one_side_is_refused),
-        RT_CASE(surfaces_that_cross_themselves_are_refused_with_the_triangles),
+        RT_CASE(faces_that_collapse_are_dropped), RT_CASE(a_triangle_on_a_line_lends_its_corner_to_the_neighbour),
+        RT_CASE(open_surfaces_are_refused_with_their_edges), RT_CASE(edges_of_many_faces_are_refused_with_their_place),
+        RT_CASE(a_surface_with_one_side_is_refused), RT_CASE(surfaces_that_cross_themselves_are_refused_with_the_triangles),
         RT_CASE(touching_is_crossing_and_an_ulp_is_a_gap), RT_CASE(two_bodies_may_not_overlap_in_a_plane),
         RT_CASE(shells_and_faces_without_size_are_refused), RT_CASE(what_is_written_is_read_back_bit_by_bit))
