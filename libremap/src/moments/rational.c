@@ -175,7 +175,7 @@ const rm_modulus *rm_moments_modulus(work *w, int64_t k)
 
 bool rm_moments_is_zero(work *w, const exact_sum *sum)
 {
-  int64_t bits = -1; /* not known yet */
+  int64_t bits = sum->num_sides + sum->num_strips > 0 ? -1 : 0; /* not known yet */
 
   for (int64_t k = 0; bits; k++) { /* denominators have too few prime factors to make more than that many images useless */
     const rm_modulus *m = rm_moments_modulus(w, k);
