@@ -136,6 +136,38 @@ static void a_cell_of_a_hundred_thousand_faces_carries_constants(void)
   }
 }
 
-RT_MAIN(RT_CASE(tangled_cells_carry_constants), RT_CASE(inverted_cells_are_counted_and_the_worst_is_named),
-        RT_CASE(cells_collapsed_to_an_axis_carry_constants), RT_CASE(nodes_given_once_per_face_are_the_same_nodes),
-        RT_CASE(hanging_nodes_carry_constants), RT_CASE(a_cell_of_a_hundred_thousand_faces_carries_constants))
+/* What remap_build makes of a mesh on itself in another unit. */
+static remap_status built_in_unit(double unit, char message[256])
+{
+  const double   m[12] = {unit, 0, 0, 0, 0, unit, 0, 0, 0, 0, unit, 0};
+  tm_mesh       *mesh = warped(3, .3), *mine = tm_part(mesh, (int[27]){0}, rt_rank(), 0);
+  remap_context *ctx = NULL;
+  remap_status   status;
+
+  tm_move(mine, tm_affine, m);
+  RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &ctx), REMAP_OK);
+  for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, (remap_side)side, &mine->view), REMAP_OK);
+  status = remap_build(ctx);
+  snprintf(message, 256, "%s", remap_message(ctx));
+  remap_destroy(&ctx);
+  tm_free(mesh);
+  tm_free(mine);
+  return status;
+}
+
+static void a_unit_in_which_volumes_are_no_doubles_is_refused_by_a_message(void)
+{
+  static const double refused[] = {1e105, 1e70, 1e-105, 1e-70}, good[] = {1e55, 1e-55};
+  char                message[256];
+
+  for (int k = 0; k < 4; k++) {
+    RT_EQ(built_in_unit(refused[k], message), REMAP_BAD_MESH);
+    RT_CHECK(strstr(message, "no doubles in this unit") != NULL);
+  }
+  for (int k = 0; k < 2; k++) RT_EQ(built_in_unit(good[k], message), REMAP_OK);
+}
+
+RT_MAIN(RT_CASE(a_unit_in_which_volumes_are_no_doubles_is_refused_by_a_message), RT_CASE(tangled_cells_carry_constants),
+        RT_CASE(inverted_cells_are_counted_and_the_worst_is_named), RT_CASE(cells_collapsed_to_an_axis_carry_constants),
+        RT_CASE(nodes_given_once_per_face_are_the_same_nodes), RT_CASE(hanging_nodes_carry_constants),
+        RT_CASE(a_cell_of_a_hundred_thousand_faces_carries_constants))
