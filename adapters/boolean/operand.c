@@ -251,6 +251,14 @@ static cli_exit take_fields(MPI_Comm comm, const bool_options *options, remap_co
   return code;
 }
 
+/* A solution that was asked for is in one of the operands at least. */
+static cli_exit check_solution(const bool_options *options, const bool_operand operand[2], cli_failure *why)
+{
+  if (!options->solution || operand[0].solution.name || operand[1].solution.name) return CLI_DONE;
+  return cli_fail(why, CLI_USAGE, "--solution: neither %s nor %s has a solution %.64s: give another", options->path[0],
+                  options->path[1], options->solution);
+}
+
 /* ---- both ---------------------------------------------------------------------------------------------------------- */
 
 cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
@@ -259,6 +267,7 @@ cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_con
   const size_t most = (size_t)(operand[0].num_boundaries + operand[1].num_boundaries) + 1;
   cli_exit     code;
 
+  CLI_TRY(check_solution(options, operand, why));
   *out = (bool_content){.content       = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}},
                         .boundary_name = calloc(most, sizeof *out->boundary_name),
                         .boundary_type = calloc(most, sizeof *out->boundary_type),

@@ -24,6 +24,7 @@ wrong_usage "an empty argument is refused" "empty" union cube.obj dice.obj -o ou
 wrong_usage "OUT must not be A" "cube.obj" union cube.obj dice.obj -o ./cube.obj
 wrong_usage "OUT must not be B" "dice.obj" union cube.obj dice.obj -o dice.obj
 wrong_usage "the report must not be OUT" "result.cgns" union cube.obj dice.obj --report out/result.cgns -o out/result.cgns
+wrong_usage "a solution that nobody has is told" "Missing" imprint good.cgns dice.obj --solution Missing -o out/result.cgns
 wrong_usage "a field that nobody has is told" "Vorticity" imprint good.cgns dice.obj -f Vorticity -o out/result.cgns
 
 works 1 --help
