@@ -56,8 +56,8 @@ void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, do
     const double other = rm_value_at(u, stencil->num_cells, stencil->neighbour[k]), rise = other - value;
 
     for (int d = 0; d < 3; d++) slope[d] += stencil->weight[k][d] * rise;
-    bounds[0] = fmin(bounds[0], other);
-    bounds[1] = fmax(bounds[1], other);
+    if (other < bounds[0]) bounds[0] = other; /* not by fmin, which is a call; what is no number changes nothing either way */
+    if (other > bounds[1]) bounds[1] = other;
   }
   if (!isfinite(slope[0]) || !isfinite(slope[1]) || !isfinite(slope[2])) slope[0] = slope[1] = slope[2] = 0.0;
 }
