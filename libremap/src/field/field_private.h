@@ -193,11 +193,10 @@ void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const r
 /* Cells are smooth if none within so many layers of neighbours is rough. */
 enum { RM_ROUGH_LAYERS = 3 };
 
-/* 1 for own cells that are rough or have a rough neighbour, 0 for others, [giving cells][num_fields]. Not collective. */
-void rm_smooth_spread(const rm_stencil *stencil, const rm_packing *packing, rm_numbers rough, double *spread);
-
-/* Are a cell and its neighbours all not rough? Not collective. */
-bool rm_is_smooth(const rm_stencil *stencil, rm_lid cell, const rm_around *rough);
+/* 1 for own cells that are rough or have a rough neighbour, 0 for others, [cells][num_fields]: one layer more. needs_halo
+ * [cells] says whose neighbours are on other ranks. Not collective. */
+void rm_smooth_spread(const rm_ground *ground, const uint8_t *needs_halo, const rm_packing *packing, rm_numbers rough,
+                      double *spread);
 
 /* ---- profile --------------------------------------------------------------------------------------------------- */
 
@@ -233,7 +232,7 @@ struct rm_profile {
   rm_flow   halo;               /* numbers around the stencils                                    */
   rm_flow   slopes, roughs;     /* likewise slopes and roughness, if smooth cells are told from others */
   double (*slope)[4];           /* [cells][num_fields]                                            */
-  double       *rough, *spread; /* [cells][num_fields] cells that are rough, and their neighbours too */
+  double       *rough, *spread; /* [cells][num_fields] 1: a cell that is rough, or near one; spread is the last layer */
   uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
   const double *given;          /* [cells][num_fields] values as the caller has them              */
   const double *number;         /* [cells][num_fields] what is reconstructed: given, or amounts per mass */

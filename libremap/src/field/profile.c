@@ -116,14 +116,16 @@ static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *pa
   if (word->note.status == REMAP_OK)
     rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[4])p->slope,
                         (const double(*)[4])(const void *)p->slopes.received, p->rough);
-  rm_word_post(word, comm, &p->roughs, bytes, p->rough);
-  rm_word_await(word, comm, &p->roughs);
-  for (int layer = 1; layer < RM_ROUGH_LAYERS; layer++) {
-    double *from = layer % 2 ? p->rough : p->spread, *to = layer % 2 ? p->spread : p->rough;
+  for (int layer = 0; layer < RM_ROUGH_LAYERS; layer++) {
+    double *const before = p->rough;
 
-    if (word->note.status == REMAP_OK) rm_smooth_spread(stencil, packing, (rm_numbers){from, rm_flow_numbers(&p->roughs)}, to);
-    rm_word_post(word, comm, &p->roughs, bytes, to);
+    rm_word_post(word, comm, &p->roughs, bytes, p->rough);
     rm_word_await(word, comm, &p->roughs);
+    if (word->note.status == REMAP_OK)
+      rm_smooth_spread(&p->ground, p->needs_halo, packing, (rm_numbers){p->rough, rm_flow_numbers(&p->roughs)}, p->spread);
+    if (layer + 1 == RM_ROUGH_LAYERS) break;
+    p->rough  = p->spread;
+    p->spread = before;
   }
 }
 
@@ -159,7 +161,4 @@ void rm_profile_finish(rm_profile *p, const rm_comm *comm, const rm_packing *pac
   if (word->note.status == REMAP_OK) rm_reconstruct(p, packing, 1);
 }
 
-void rm_profile_abandon(rm_profile *p, const rm_comm *comm, rm_word *word)
-{
-  rm_word_await(word, comm, &p->halo);
-}
+void rm_profile_abandon(rm_profile *p, const rm_comm *comm, rm_word *word) { rm_word_await(word, comm, &p->halo); }

@@ -193,7 +193,7 @@ static double receive_content(const rm_receipt *w, int f, rm_lid cell, double ol
   double       value;
 
   kept *= measure;
-  value = (s->content + kept) / volume / measure;
+  value = (s->content + kept) / (volume * measure);
   if (is_void(volume, s)) {
     value = is_blend(w, f, cell) ? RM_VALUE_SCALE * old : plain_mean(w, f, cell, s) / measure;
     kept  = is_blend(w, f, cell) ? value * (volume - s->volume) * measure : 0.0;

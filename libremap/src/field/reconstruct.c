@@ -124,7 +124,8 @@ static void fit_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell
   const double      value      = rm_value_at(&u, mesh->num_cells, cell);
   const double      extreme[2] = {w->extreme[f], w->extreme[packing->num_fields + f]};
 
-  *out = (fit){.factor = 1.0};
+  out->factor       = 1.0;
+  out->is_quadratic = out->is_reduced = out->is_limited = false;
   rm_fit_slope(stencil, cell, &u, out->linear, out->bounds);
   for (int b = 0; b < 2; b++) out->local[b] = out->bounds[b];
   if (is_carried(packing, f) && (is_smooth || !packing->is_limited))
@@ -165,10 +166,7 @@ static bool is_fraction(const rm_packing *packing, int f)
 
 static bool is_smooth_cell(const rm_profile *w, const rm_packing *packing, rm_lid cell, int f)
 {
-  const rm_around rough = rm_around_of((rm_numbers){RM_ROUGH_LAYERS % 2 ? w->rough : w->spread, rm_flow_numbers(&w->roughs)}, f,
-                                       packing->num_fields);
-
-  return packing->is_checked && rm_is_smooth(w->ground.stencil, cell, &rough);
+  return packing->is_checked && !(w->spread[(int64_t)cell * packing->num_fields + f] > 0.0);
 }
 
 /* The mass fractions of a system keep their sum: they are limited alike. */
@@ -261,7 +259,7 @@ void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t whic
 
     if (w->needs_halo[c] != which) continue;
     for (int f = 0; f < num; f++) {
-      place[packing->at[f]] = is_same ? given[f] : rm_system_amount(packing, f, given, number);
+      place[packing->at[f]] = is_same || packing->system_of[f] < 0 ? given[f] : rm_system_amount(packing, f, given, number);
       for (int k = RM_PACK_SLOPE; k < rm_pack_width(packing->degree[f], packing->has_bounds) && !asked; k++)
         place[packing->at[f] + k] = 0.0; /* nobody asks for it */
     }

@@ -15,6 +15,8 @@
  * Slopes and ranges of other ranks' cells come in one exchange, roughness in three. O(neighbours) per cell and field. */
 #include "field_private.h"
 
+#include <string.h>
+
 static const double ROUGH = 0.2;
 
 void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[4])
@@ -69,22 +71,25 @@ void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const r
     }
 }
 
-bool rm_is_smooth(const rm_stencil *stencil, rm_lid cell, const rm_around *rough)
+void rm_smooth_spread(const rm_ground *ground, const uint8_t *needs_halo, const rm_packing *packing, rm_numbers rough,
+                      double *spread)
 {
-  if (rm_value_at(rough, stencil->num_cells, cell) > 0.0) return false;
-  for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++)
-    if (rm_value_at(rough, stencil->num_cells, stencil->neighbour[k]) > 0.0) return false;
-  return true;
-}
+  const rm_stencil *stencil = ground->stencil;
+  const int         num     = packing->num_fields;
 
-void rm_smooth_spread(const rm_stencil *stencil, const rm_packing *packing, rm_numbers rough, double *spread)
-{
-  const int num = packing->num_fields;
+  memcpy(spread, rough.own, (size_t)stencil->num_cells * (size_t)num * sizeof *spread);
+  for (rm_lid c = 0; c < stencil->num_cells;
+       c++) { /* from the rough cells, which are few, but for those that are nobody's neighbour */
+    const int64_t first = stencil->offset[c], end = stencil->offset[c + 1];
 
-  for (rm_lid c = 0; c < stencil->num_cells; c++)
-    for (int f = 0; f < num; f++) {
-      const rm_around around = rm_around_of(rough, f, num);
-
-      spread[(int64_t)c * num + f] = rm_is_smooth(stencil, c, &around) ? 0.0 : 1.0;
+    for (int f = 0; f < num && ground->rows->cover[c] != REMAP_UNWANTED; f++) {
+      if (!(rough.own[(int64_t)c * num + f] > 0.0)) continue;
+      for (int64_t k = first; k < end; k++)
+        if (stencil->neighbour[k] < stencil->num_cells) spread[(int64_t)stencil->neighbour[k] * num + f] = 1.0;
     }
+    for (int64_t k = first; k < end && needs_halo[c]; k++)
+      for (int f = 0; f < num && stencil->neighbour[k] >= stencil->num_cells; f++)
+        if (rough.halo[(int64_t)(stencil->neighbour[k] - stencil->num_cells) * num + f] > 0.0)
+          spread[(int64_t)c * num + f] = 1.0;
+  }
 }
