@@ -50,6 +50,37 @@ static void tangled_cells_carry_constants(void)
   }
 }
 
+/* Nodes swapped with their neighbours, more and more of them. */
+static void tangled_cells_conserve_any_field(void)
+{
+  const int n = 4;
+
+  for (int m = 2; m <= 6; m++) {
+    tm_mesh *tangled = warped(n, .3);
+    uint64_t seed    = (uint64_t)m;
+    carried  w;
+
+    for (int k = 0; k < m; k++) {
+      double *p = node(tangled, n, 1 + (int)tm_random(&seed, 2), 1 + (int)tm_random(&seed, 2), 1 + (int)tm_random(&seed, 2));
+      double *q = p + (tm_random(&seed, 2) ? 3 : 3 * (n + 1));
+      for (int c = 0; c < 3; c++) {
+        const double x = p[c];
+        p[c]           = q[c];
+        q[c]           = x;
+      }
+    }
+    if (carried_open(&w, MPI_COMM_WORLD, 2, tangled, warped(m, .9), 17))
+      for (int to = 0; to < 2; to++) {
+        remap_field_report report;
+
+        for (int64_t c = 0; c < w.cells[1 - to]; c++) w.mean[1 - to][c] = 1 + sin(1.7 * (double)c);
+        if (carried_move(&w, to ? REMAP_FORWARD : REMAP_BACKWARD, 2, REMAP_LIMITER_NONE, w.mean[1 - to], w.got[to], &report))
+          RT_CHECK(report.conservation_error <= 1e-14);
+      }
+    carried_close(&w);
+  }
+}
+
 /* One column of cells is turned over: every cell of it has its volume, negative. */
 static void inverted_cells_are_counted_and_the_worst_is_named(void)
 {
@@ -168,6 +199,6 @@ static void a_unit_in_which_volumes_are_no_doubles_is_refused_by_a_message(void)
 }
 
 RT_MAIN(RT_CASE(a_unit_in_which_volumes_are_no_doubles_is_refused_by_a_message), RT_CASE(tangled_cells_carry_constants),
-        RT_CASE(inverted_cells_are_counted_and_the_worst_is_named), RT_CASE(cells_collapsed_to_an_axis_carry_constants),
-        RT_CASE(nodes_given_once_per_face_are_the_same_nodes), RT_CASE(hanging_nodes_carry_constants),
-        RT_CASE(a_cell_of_a_hundred_thousand_faces_carries_constants))
+        RT_CASE(tangled_cells_conserve_any_field), RT_CASE(inverted_cells_are_counted_and_the_worst_is_named),
+        RT_CASE(cells_collapsed_to_an_axis_carry_constants), RT_CASE(nodes_given_once_per_face_are_the_same_nodes),
+        RT_CASE(hanging_nodes_carry_constants), RT_CASE(a_cell_of_a_hundred_thousand_faces_carries_constants))
