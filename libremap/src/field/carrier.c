@@ -203,7 +203,7 @@ static remap_status gather(rm_carrier *c)
   }
   rm_turn_vectors(setup, &c->packing, c->given);
   if (c->packing.num_systems > 0) {
-    RM_TRY(rm_gather_numbers(setup->giving, setup->giving_rows, &c->packing, c->given, c->number, "the", reason));
+    RM_TRY(rm_gather_numbers(setup->giving, setup->giving_rows, &c->packing, c->given, c->number, reason));
     RM_TRY(rm_gather_amounts(setup, &c->packing, c->value, c->room, reason));
   }
   if (blends(c)) rm_gather_kept(setup, &c->packing, c->kept, c->kept_number);

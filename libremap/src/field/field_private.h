@@ -391,7 +391,7 @@ void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, 
 void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, double *given);
 /* What is reconstructed, from what is given; they may be the same array. BAD_VALUE if a density is not positive. */
 remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
-                               double *number, const char *which, rm_reason *reason);
+                               double *number, rm_reason *reason);
 
 /* ---- receive --------------------------------------------------------------------------------------------------- */
 

@@ -146,7 +146,7 @@ void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, 
 }
 
 remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
-                               double *number, const char *which, rm_reason *reason)
+                               double *number, rm_reason *reason)
 {
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
     const int64_t at  = (int64_t)c * packing->num_fields;
@@ -157,8 +157,8 @@ remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const r
       continue;
     }
     if (!rm_system_numbers(packing, given + at, number + at, &bad))
-      return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[c], "field %s: %s density %g is not above 0",
-                     label_of(packing, bad).text, which, given[at + bad]);
+      return rm_fail(REMAP_BAD_VALUE, reason, mesh->side, mesh->cell_global[c], "field %s: the density %g is not above 0",
+                     label_of(packing, bad).text, given[at + bad]);
   }
   return REMAP_OK;
 }

@@ -55,6 +55,19 @@ static remap_status bad_field(const remap_field_desc *field, const char *what, r
   return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "field %s: %s", field->name ? field->name : "?", what);
 }
 
+/* Are there three momenta, or three velocities? */
+static bool is_vector(const rm_system *s, const remap_field_desc *fields)
+{
+  int num_velocities = 0, num = 0;
+
+  for (int d = 0; d < 3; d++) {
+    if (s->motion[d] < 0) continue;
+    num++;
+    num_velocities += fields[s->motion[d]].role >= REMAP_ROLE_VELOCITY_X;
+  }
+  return num == 3 && num_velocities % 3 == 0;
+}
+
 /* A field within its system, which is there. */
 static remap_status check_member(const remap_transfer *how, const remap_field_desc *field, int f, const rm_system *s,
                                  const remap_field_desc *fields, rm_reason *reason)
@@ -80,8 +93,8 @@ static remap_status check_member(const remap_transfer *how, const remap_field_de
     return bad_field(field, "pressure and temperature need gamma above 1: give it, or system 0", reason);
   if (role == REMAP_ROLE_TEMPERATURE && !(how->gas_constant > 0.0))
     return bad_field(field, "temperature needs a gas constant above 0: give it, or system 0", reason);
-  if (how->rotation && is_moving(role) && (s->motion[0] < 0 || s->motion[1] < 0 || s->motion[2] < 0))
-    return bad_field(field, "a rotation needs all three components of what moves", reason);
+  if (how->rotation && is_moving(role) && !is_vector(s, fields))
+    return bad_field(field, "a rotation needs all three components of momentum, or all of velocity", reason);
   return REMAP_OK;
 }
 
