@@ -86,8 +86,10 @@ static bool number_face(bc_zone *z, const int64_t *corner, int n, int64_t number
   int     num    = 0;
 
   for (int i = 0; i < n; i++) {
-    const int64_t node = corner[i] - 1;
+    const int64_t node = corner[i] < 1 ? -1 : corner[i] - 1;
     int           k    = 0;
+
+    if (node < 0) return true; /* of no node: no face of ours */
 
     while (k < num && key[k] != node) k++;
     if (k < num) continue;
@@ -109,7 +111,7 @@ static rcgns_status number_fixed(bc_zone *z, int64_t node, int npe, int corners,
   int64_t       *block;
   rcgns_status   status;
 
-  if (!range || num < 1 || rc_node_at(tree, data)->kind != 'I') return RCGNS_OK;
+  if (!range || range[0] < 1 || range[0] > INT64_MAX / 2 || num < 1 || rc_node_at(tree, data)->kind != 'I') return RCGNS_OK;
   block  = rc_alloc((int64_t)BLOCK * npe, sizeof *block);
   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
   for (int64_t lo = 0; lo < num && status == RCGNS_OK; lo += BLOCK) {
@@ -176,8 +178,9 @@ static void give_range(const bc_zone *z, const int64_t *range, bool of_vertices,
     bool           in = true;
 
     for (int d = 0; d < 3 && in; d++) {
-      const int64_t lo = range[d] < range[d + 3] ? range[d] : range[d + 3], hi = range[d] + range[d + 3] - lo,
-                    cell = key[1 + d] + 1;
+      const int64_t lo   = range[d] < range[d + 3] ? range[d] : range[d + 3],
+                    hi   = range[d] < range[d + 3] ? range[d + 3] : range[d];
+      const int64_t cell = key[1 + d] + 1;
 
       in = d == axis ? lo == hi && lo == cell + key[0] % 2 : lo <= cell && cell + of_vertices <= hi;
     }
@@ -185,14 +188,27 @@ static void give_range(const bc_zone *z, const int64_t *range, bool of_vertices,
   }
 }
 
-/* What a list or range names: the faces with these element numbers, or nodes. */
+/* What a list names: the faces with these element numbers, or nodes. */
 static void give_numbers(bc_zone *z, const int64_t *number, int64_t n, bool of_vertices, int32_t boundary)
 {
   for (int64_t i = 0; i < n; i++) {
-    const int64_t key = number[i] - of_vertices, at = rc_map_find(of_vertices ? &z->node : &z->by_number, &key);
+    const int64_t key = number[i] < 1 ? -1 : number[i] - of_vertices;
+    const int64_t at  = rc_map_find(of_vertices ? &z->node : &z->by_number, &key);
 
     if (at >= 0 && of_vertices) z->named[at] = 1;
     if (at >= 0 && !of_vertices) give(z, ((const int64_t *)z->rim_of_number.item)[at], boundary);
+  }
+}
+
+/* The same of all numbers from lo to hi. */
+static void give_span(bc_zone *z, int64_t lo, int64_t hi, bool of_vertices, int32_t boundary)
+{
+  const rc_array *keys = of_vertices ? &z->node.key : &z->by_number.key;
+
+  for (int64_t i = 0; i < keys->count; i++) {
+    const int64_t number = ((const int64_t *)keys->item)[i] + of_vertices;
+
+    if (number >= lo && number <= hi) give_numbers(z, &number, 1, of_vertices, boundary);
   }
 }
 
@@ -209,29 +225,36 @@ static void give_named(bc_zone *z, int32_t boundary)
   if (z->node.key.count) memset(z->named, 0, (size_t)z->node.key.count);
 }
 
-/* A list or range of numbers, in blocks. Collective. */
-static rcgns_status give_list(bc_zone *z, int64_t node, bool is_range, bool of_vertices, int32_t boundary,
-                              rcgns_message *message)
+/* A list of numbers, in blocks. Collective. */
+static rcgns_status give_list(bc_zone *z, int64_t node, bool of_vertices, int32_t boundary, rcgns_message *message)
 {
   const rc_node *n      = rc_node_at(&z->file->tree, node);
   const rc_box   box    = rc_whole(n);
-  const int64_t *range  = is_range ? rc_small_ints(&z->file->tree, n) : NULL;
-  const int64_t  num    = range ? range[1] - range[0] + 1 : rc_count(n);
   int64_t       *block  = rc_alloc(BLOCK, sizeof *block);
   rcgns_status   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
 
-  for (int64_t lo = 0; lo < num && status == RCGNS_OK; lo += BLOCK) {
-    const int64_t hi = lo + BLOCK < num ? lo + BLOCK : num;
+  for (int64_t lo = 0; lo < rc_count(n) && status == RCGNS_OK; lo += BLOCK) {
+    const int64_t hi = lo + BLOCK < rc_count(n) ? lo + BLOCK : rc_count(n);
 
-    if (range)
-      for (int64_t i = lo; i < hi; i++) block[i - lo] = range[0] + i;
-    else
-      status = rc_read(z->file, RCGNS_OK, node, &box, lo, hi, 'I', block, message);
+    status = rc_read(z->file, RCGNS_OK, node, &box, lo, hi, 'I', block, message);
     if (status == RCGNS_OK) give_numbers(z, block, hi - lo, of_vertices, boundary);
   }
-  if (status == RCGNS_OK && of_vertices) give_named(z, boundary);
   free(block);
   return status;
+}
+
+/* Numbers of an unstructured zone, in a list or as a range. Collective. */
+static rcgns_status give_place(bc_zone *z, int64_t node, bool is_range, bool of_vertices, int32_t boundary,
+                               rcgns_message *message)
+{
+  const int64_t *range = is_range ? rc_small_ints(&z->file->tree, rc_node_at(&z->file->tree, node)) : NULL;
+
+  if (range)
+    give_span(z, range[0], range[1], of_vertices, boundary);
+  else
+    RC_TRY(give_list(z, node, of_vertices, boundary, message));
+  if (of_vertices) give_named(z, boundary);
+  return RCGNS_OK;
 }
 
 /* ---- names ----------------------------------------------------------------------------------------------------------- */
@@ -316,7 +339,7 @@ static int64_t place_of(const rc_tree *tree, int64_t bc, bool *is_range, bool *i
     if (at < 0 || rc_node_at(tree, at)->kind != 'I') continue;
     *is_range    = i % 2 == 0;
     *is_elements = i >= 2;
-    if (!*is_range || rc_small_ints(tree, rc_node_at(tree, at))) return at;
+    if (!*is_range || (rc_small_ints(tree, rc_node_at(tree, at)) && rc_count(rc_node_at(tree, at)) >= 2)) return at;
   }
   return -1;
 }
@@ -340,7 +363,7 @@ static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
     return RCGNS_OK;
   }
   if (place >= 0 && !z->zone->is_structured && !(of_vertices && z->zone->num_face_sections))
-    return give_list(z, place, is_range, of_vertices, boundary, message);
+    return give_place(z, place, is_range, of_vertices, boundary, message);
   snprintf(text, sizeof text, "zone %.60s: boundary condition %s is left out: its place is given in a way that is not read",
            z->zone->name, rc_node_at(tree, bc)->name);
   return rc_note(z->file, message, text);

@@ -37,6 +37,16 @@ static void write_polyhedra(const char *path)
   tm_free(mesh);
 }
 
+/* A boundary condition; location NULL: none is said. */
+static void put_bc(cf_file *f, int64_t zone, const char *place, int nd, const int64_t *dim, const int64_t *number,
+                   const char *location)
+{
+  const int64_t at = cf_text(f, cf_empty(f, zone, "ZoneBC", "ZoneBC_t"), "Wall", "BC_t", "BCWall");
+
+  cf_put(f, at, place, "IndexArray_t", "I4", nd, dim, 'I', number);
+  if (location) cf_text(f, at, "GridLocation", "GridLocation_t", location);
+}
+
 /* A zone of every element type: in sections of one type, or MIXED. */
 static void write_elements(const char *path, bool mixed)
 {
@@ -56,6 +66,10 @@ static void write_elements(const char *path, bool mixed)
     cf_section(f, zone, "Tetra", 10, 5, 5, 4, CF_ZOO_TETRA);
     cf_section(f, zone, "Quad", 7, 6, 6, 4, CF_ZOO_QUAD);
   }
+  if (mixed)
+    put_bc(f, zone, "PointList", 2, (int64_t[]){4, 1}, (int64_t[]){1, 2, 5, 4}, NULL);
+  else
+    put_bc(f, zone, "PointRange", 2, (int64_t[]){2, 1}, (int64_t[]){6, 6}, "FaceCenter");
   cf_solution(f, zone, "First", "Density", CF_ZOO_CELLS, value);
   cf_solution(f, zone, "Second", "Density", CF_ZOO_CELLS, value);
   const int64_t steps = cf_ints(f, base, "Steps", "BaseIterativeData_t", 1, (int64_t[]){2});
@@ -87,6 +101,7 @@ static void write_parents(const char *path)
   const int64_t section = cf_section(f, zone, "Faces", 22, 1, n, corners, node);
   cf_offsets(f, section, n + 1, mesh->face_offset);
   cf_put(f, section, "ParentElements", "DataArray_t", "I8", 2, (int64_t[]){2, n}, 'I', parent);
+  put_bc(f, zone, "PointList", 2, (int64_t[]){3, 1}, (int64_t[]){1, 2, 3}, "FaceCenter");
   cf_write(f, path);
   free(node);
   free(parent);
@@ -106,6 +121,7 @@ static void write_rind(const char *path)
   cf_ints(f, cf_coordinates(f, zone, xyz, 3, (int64_t[]){5, 5, 5}), "Rind", "Rind_t", 6, layer);
   const int64_t solution = cf_solution(f, zone, "S", "Density", 0, NULL);
   cf_ints(f, solution, "Rind", "Rind_t", 6, layer);
+  put_bc(f, zone, "PointRange", 2, (int64_t[]){2, 3}, (int64_t[]){1, 1, 1, 1, 3, 3}, NULL);
   cf_put(f, solution, "Density", "DataArray_t", "R8", 3, (int64_t[]){4, 4, 4}, 'R', value);
   cf_write(f, path);
 }
@@ -316,6 +332,18 @@ static void read_fields(rcgns_file *file, double *value)
   }
 }
 
+static void read_boundaries(rcgns_file *file)
+{
+  const int64_t    num = rcgns_mesh(file)->num_faces;
+  rcgns_boundaries boundaries;
+  rcgns_message    why;
+  rcgns_status     status = rcgns_read_boundaries(file, &boundaries, &why);
+
+  check_status(status, &why);
+  for (int64_t f = 0; status == RCGNS_OK && f < num; f++)
+    FUZZ_CHECK(boundaries.face[f] >= -1 && boundaries.face[f] < boundaries.num);
+}
+
 static void overlay_with_itself(const remap_mesh *mesh)
 {
   remap_context *ctx = NULL;
@@ -359,6 +387,7 @@ static void try_file(const char *path, const char *output)
   if (rcgns_get_info(file)->num_cells <= MOST_CELLS) {
     double *value = tm_alloc_(rcgns_mesh(file)->num_cells, sizeof *value);
 
+    read_boundaries(file);
     read_fields(file, value);
     overlay_with_itself(rcgns_mesh(file));
     write_and_read(file, output, value);

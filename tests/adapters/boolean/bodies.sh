@@ -46,3 +46,21 @@ alike() {
     cmp -s on1."$ending" "on$n.$ending" || complain "$ending: other bytes on $n ranks"
   done
 }
+
+# area FILE GROUP: the area of the faces of a group of an OBJ file.
+area() {
+  awk -v want="$2" '
+    /^v/ { n++; x[n] = $2; y[n] = $3; z[n] = $4 }
+    /^g/ { on = $2 == want }
+    /^f/ && on {
+      ax = ay = az = 0
+      for (i = 3; i < NF; i++) {
+        ux = x[$i] - x[$2]; uy = y[$i] - y[$2]; uz = z[$i] - z[$2]
+        k = i + 1
+        vx = x[$k] - x[$2]; vy = y[$k] - y[$2]; vz = z[$k] - z[$2]
+        ax += uy * vz - uz * vy; ay += uz * vx - ux * vz; az += ux * vy - uy * vx
+      }
+      sum += sqrt(ax * ax + ay * ay + az * az) / 2
+    }
+    END { printf "%.15g", sum }' "$1"
+}

@@ -29,6 +29,11 @@ makes 0.125 intersection good.cgns dice.obj -o out.cgns
 hold "$wrong" "a surface cuts a mesh"
 value result boundaries 0 | grep -qx dice || complain "no boundary dice"
 hold "$wrong" "what the surface cuts gets its name"
+makes 0.125 intersection good.cgns dice.obj -o corner.cgns
+makes 0.125 imprint corner.cgns away.obj -o corner.obj # by the BC_t of corner.cgns
+near "$(area corner.obj dice)" 0.75 1e-14
+near "$(area corner.obj unnamed)" 0.75 1e-14
+hold "$wrong" "names come through a CGNS file with the faces that they belong to"
 
 alike cgns "1 2 3 4" union good.cgns half.cgns
 alike vtu "1 4" union good.cgns dice.obj

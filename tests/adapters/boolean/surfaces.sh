@@ -28,6 +28,8 @@ makes 0.875 difference cube.obj dice.obj -o out.obj
 makes 0.875 difference cube.obj dice.obj -o out.stl
 [ "$(grep '^solid ' out.stl | tr '\n' ' ')" = "solid cube solid dice " ] || complain "$(grep solid out.stl)"
 makes 0.875 intersection out.stl cube.obj -o again.obj
+near "$(area out.obj cube)" 5.25 1e-14
+near "$(area out.obj dice)" 0.75 1e-14
 hold "$wrong" "outer surfaces keep the names of their faces, and are good to go on with"
 
 for ending in stl obj; do alike "$ending" "1 3" union cube.obj dice.obj; done
