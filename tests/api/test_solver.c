@@ -525,6 +525,86 @@ static void masked_cells_are_as_good_as_not_there(void)
   close_world(&w);
 }
 
+/* ---- who has what -------------------------------------------------------------------------------------------------------- */
+
+/* The source on the even ranks, the target on the others: no rank has both, and the bits are those of any other partition. */
+static void meshes_on_ranks_of_their_own_make_the_same_bits(void)
+{
+  world w, apart;
+
+  if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 23)) {
+    double *want = moved(&w, 0), *by_global = tm_alloc_(w.whole[1]->view.num_cells, sizeof *by_global);
+
+    for (int64_t c = 0; c < w.cells[1]; c++) by_global[w.mine[1]->global[c]] = want[c];
+    MPI_Allreduce(MPI_IN_PLACE, by_global, (int)w.whole[1]->view.num_cells, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
+    memset(&apart, 0, sizeof apart);
+    RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &apart.ctx), REMAP_OK);
+    for (int side = 0; side < 2; side++) {
+      apart.whole[side] = make(side);
+      int *deal         = tm_deal(apart.whole[side], rt_size(), TM_RANDOM, 29);
+
+      for (int64_t c = 0; c < apart.whole[side]->view.num_cells && rt_size() > 1; c++) {
+        deal[c] = deal[c] / 2 * 2 + side;
+        if (deal[c] >= rt_size()) deal[c] = side;
+      }
+      apart.mine[side]  = tm_part(apart.whole[side], deal, rt_rank(), 31);
+      apart.cells[side] = apart.mine[side]->view.num_cells;
+      apart.u[side]     = tm_alloc_(apart.cells[side], sizeof(double));
+      for (int64_t c = 0; c < apart.cells[side]; c++) apart.u[side][c] = lot(apart.mine[side]->global[c]);
+      free(deal);
+      if (rt_size() > 1 && rt_rank() % 2 != side) RT_EQ(apart.cells[side], 0);
+      RT_EQ(remap_set_mesh(apart.ctx, side, apart.cells[side] ? &apart.mine[side]->view : &(remap_mesh){0}), REMAP_OK);
+    }
+    if (rt_all(RT_EQ(remap_build(apart.ctx), REMAP_OK))) {
+      double *got = moved(&apart, 0), *back = moved(&apart, 1);
+
+      for (int64_t c = 0; c < apart.cells[1]; c++) RT_NEAR(got[c], by_global[apart.mine[1]->global[c]], 0.0);
+      free(got), free(back);
+    }
+    free(want), free(by_global);
+    close_world(&apart);
+  }
+  close_world(&w);
+}
+
+/* With the view of pairs a solver does a transfer of order 1 by itself: values come from the ranks that the view names. */
+static void pairs_and_their_owners_are_enough_for_a_transfer(void)
+{
+  world w;
+
+  if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 37)) {
+    const int64_t     num   = w.whole[0]->view.num_cells;
+    double           *value = tm_alloc_(num, sizeof *value), *got = tm_alloc_(w.cells[1], sizeof *got);
+    double           *volume = tm_alloc_(w.cells[1], sizeof *volume);
+    int              *owner = tm_alloc_(num, sizeof *owner);
+    remap_transfer    how   = nearest();
+    remap_pairs_view  pairs;
+    remap_field_desc  f = {.nature = REMAP_CONSERVED, .in = w.u[0], .out = got};
+
+    for (int64_t c = 0; c < w.cells[0]; c++) {
+      value[w.mine[0]->global[c]] = w.u[0][c];
+      owner[w.mine[0]->global[c]] = rt_rank();
+    }
+    MPI_Allreduce(MPI_IN_PLACE, value, (int)num, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
+    MPI_Allreduce(MPI_IN_PLACE, owner, (int)num, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
+    how.order = 1, how.on_partial = REMAP_PARTIAL_CONSERVE, how.on_uncovered = REMAP_UNCOVERED_FILL, how.fill_value = 0;
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
+    RT_EQ(remap_cells(w.ctx, REMAP_TARGET, volume, NULL), REMAP_OK);
+    if (RT_EQ(remap_pairs(w.ctx, REMAP_FORWARD, &pairs), REMAP_OK) && RT_EQ(pairs.num_rows, w.cells[1]))
+      for (int64_t r = 0; r < pairs.num_rows; r++) {
+        double content = 0;
+
+        for (int64_t k = pairs.row_offset[r]; k < pairs.row_offset[r + 1]; k++) {
+          RT_EQ(pairs.owner_rank[k], owner[pairs.global_cell[k]]);
+          content += value[pairs.global_cell[k]] * pairs.volume[k];
+        }
+        RT_NEAR(got[r], content / volume[r], 1e-13);
+      }
+    free(value), free(got), free(volume), free(owner);
+  }
+  close_world(&w);
+}
+
 /* ---- contexts ------------------------------------------------------------------------------------------------------------ */
 
 static void contexts_do_not_know_of_each_other(void)
@@ -556,4 +636,5 @@ RT_MAIN(RT_CASE(halves_make_the_same_as_a_whole_in_both_directions_at_once),
         RT_CASE(a_first_transfer_that_one_rank_gets_wrong_fails_on_all),
         RT_CASE(transfers_that_differ_between_ranks_are_refused_where_they_meet), RT_CASE(strides_and_places_leave_the_rest_alone),
         RT_CASE(blocks_with_indices_of_any_kind_make_the_same_bits_as_one_mesh), RT_CASE(masked_cells_are_as_good_as_not_there),
+        RT_CASE(meshes_on_ranks_of_their_own_make_the_same_bits), RT_CASE(pairs_and_their_owners_are_enough_for_a_transfer),
         RT_CASE(contexts_do_not_know_of_each_other))

@@ -2,7 +2,8 @@
  * position, with the first transfers both ways, which prepare, and without; and a transfer after that. CPU time of the slowest rank,
  * medians over the steps. One JSON line.
  *
- *   mpirun -n P bench_move [N] [STEPS]      box of N^3 cells, zone of as many per length; default 32, 50 */
+ *   mpirun -n P bench_move [N] [STEPS] [TOP]    box of N^3 cells, zone of as many per length, up to that height; default 32, 50,
+ *                                               0.743; at 0.75 the zone ends in a plane of the box's faces */
 #include <remap/remap.h>
 #include <stdio.h>
 #include <time.h>
@@ -29,12 +30,12 @@ static double median(double *x, int n)
   return x[n / 2];
 }
 
-/* The unit cube to a ring of radii 0.08 and 0.3 about (0.5, 0.5), a third of the circle per third of y: z from 0.26 to 0.75. */
+/* The unit cube to a ring of radii 0.08 and 0.3 about (0.5, 0.5), a third of the circle per third of y: z from 0.26 to *data. */
 static void to_ring(double xyz[3], const void *data)
 {
-  const double r = .08 + .22 * xyz[0], angle = *(const double *)data * xyz[1];
+  const double r = .08 + .22 * xyz[0], angle = 2 * M_PI * xyz[1];
 
-  xyz[0] = .5 + r * cos(angle), xyz[1] = .5 + r * sin(angle), xyz[2] = .26 + .49 * xyz[2];
+  xyz[0] = .5 + r * cos(angle), xyz[1] = .5 + r * sin(angle), xyz[2] = .26 + (*(const double *)data - .26) * xyz[2];
 }
 
 static void rotation(double angle, double m[12])
@@ -71,8 +72,8 @@ int main(int argc, char **argv)
   MPI_Comm_size(MPI_COMM_WORLD, &size);
 
   const int    n = argc > 1 ? atoi(argv[1]) : 32, steps = argc > 2 ? atoi(argv[2]) : 50;
-  const double circle = 2 * M_PI;
-  tm_mesh     *whole[2] = {tm_hexahedra((int[]){n, n, n}, NULL, NULL), tm_hexahedra((int[]){(n + 3) / 4, 2 * n, (n + 1) / 2}, to_ring, &circle)};
+  const double top = argc > 3 ? atof(argv[3]) : .743;
+  tm_mesh     *whole[2] = {tm_hexahedra((int[]){n, n, n}, NULL, NULL), tm_hexahedra((int[]){(n + 3) / 4, 2 * n, (n + 1) / 2}, to_ring, &top)};
   tm_mesh     *mine[2];
   double      *move = tm_alloc_(5 * steps, sizeof *move), *fresh = move + steps, *move_all = fresh + steps, *fresh_all = move_all + steps;
   double      *field = fresh_all + steps, *q[2];
