@@ -37,6 +37,9 @@ static cli_exit check_path(const char *path, const char *word, const bool_option
       code = cli_fail(why, CLI_USAGE, "%s: it is one of the input files: choose another %s", path, word);
   if (code == CLI_DONE && !stat(path, &st) && !S_ISREG(st.st_mode))
     code = cli_fail(why, CLI_IO, "%s: it exists and is not a regular file: choose another %s", path, word);
+  if (code == CLI_DONE && rslice_file_check(path))
+    code = cli_fail(why, CLI_IO, "%s: it may not be written (%s): remove it, or choose another %s", path,
+                    strerror(rslice_file_check(path)), word);
   if (code == CLI_DONE && access(folder, W_OK | X_OK))
     code = cli_fail(why, CLI_IO, "%s: its folder cannot be written (%s): choose another %s", path, strerror(errno), word);
   free(folder);

@@ -37,6 +37,11 @@ refused 3 "cube.obj and away.obj has no cells" "an empty result is told" interse
 alone 3 "no cells" "a body without itself is empty" difference good.cgns good.cgns -o out/result.vtu
 alone 3 "no cells" "bodies that share one corner do not intersect" intersection cube.obj beside.obj -o out/result.obj
 alone 5 "out/absent/result.cgns" "a folder that is not there takes no OUT" union cube.obj dice.obj -o out/absent/result.cgns
+echo precious >kept.vtu
+chmod a-w kept.vtu
+alone 5 "kept.vtu.*may not be written" "an OUT without write permission is left alone" union cube.obj dice.obj -o kept.vtu
+[ "$(cat kept.vtu)" = precious ] || complain "kept.vtu was touched"
+hold "$wrong" "it holds what it held"
 alone 5 "$closed/result.vtu" "a folder that may not be written takes no OUT" union cube.obj dice.obj -o "$closed/result.vtu"
 refused 5 "$closed/report.json" "a report that cannot be written is told first" \
   union cube.obj dice.obj --report "$closed/report.json" -o out/result.cgns
