@@ -55,8 +55,9 @@ static void add_product(expansion *e, double a, double b)
 /* e += a b c of three differences, each a sum of two doubles. */
 static void add_product3(expansion *e, const double a[2], const double b[2], const double c[2])
 {
-  expansion ab = {.n = 0};
+  expansion ab;
 
+  ab.n = 0;
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++) add_product(&ab, a[i], b[j]);
   for (int i = 0; i < ab.n; i++)
@@ -115,15 +116,12 @@ static void add_det(expansion *e, const double *a, const double *b, const double
   }
 }
 
-int rs_turn(const double *a, const double *b, const double *c, int axis)
+/* The turn where the estimate does not decide. */
+static int exact_turn(const double *a, const double *b, const double *c, int x, int y)
 {
-  const int    x = (axis + 1) % 3, y = (axis + 2) % 3;
-  const double left = (a[x] - c[x]) * (b[y] - c[y]), right = (a[y] - c[y]) * (b[x] - c[x]);
-  const double bound = 4e-16 * (fabs(left) + fabs(right));
-  expansion    e     = {.n = 0};
+  expansion e;
 
-  if (left - right > bound) return 1;
-  if (left - right < -bound) return -1;
+  e.n = 0;
   add_product(&e, a[x], b[y]);
   add_product(&e, -a[y], b[x]);
   add_product(&e, b[x], c[y]);
@@ -131,6 +129,17 @@ int rs_turn(const double *a, const double *b, const double *c, int axis)
   add_product(&e, c[x], a[y]);
   add_product(&e, -c[y], a[x]);
   return sign_of(&e);
+}
+
+int rs_turn(const double *a, const double *b, const double *c, int axis)
+{
+  const int    x = (axis + 1) % 3, y = (axis + 2) % 3;
+  const double left = (a[x] - c[x]) * (b[y] - c[y]), right = (a[y] - c[y]) * (b[x] - c[x]);
+  const double bound = 4e-16 * (fabs(left) + fabs(right));
+
+  if (left - right > bound) return 1;
+  if (left - right < -bound) return -1;
+  return exact_turn(a, b, c, x, y);
 }
 
 /* The determinant of a - d, b - d, c - d and a bound on its error. */
@@ -153,15 +162,22 @@ static double det(const double *a, const double *b, const double *c, const doubl
   return sum;
 }
 
+/* The side where the estimate does not decide. */
+static int exact_side(const double *a, const double *b, const double *c, const double *d)
+{
+  expansion e;
+
+  e.n = 0;
+  add_det(&e, a, b, c, d);
+  return sign_of(&e);
+}
+
 int rs_side(const double *a, const double *b, const double *c, const double *d)
 {
   double       bound;
   const double estimate = det(a, b, c, d, &bound);
-  expansion    e        = {.n = 0};
 
-  if (fabs(estimate) > bound) return (estimate > 0) - (estimate < 0);
-  add_det(&e, a, b, c, d);
-  return sign_of(&e);
+  return fabs(estimate) > bound ? (estimate > 0) - (estimate < 0) : exact_side(a, b, c, d);
 }
 
 int rs_volume_sign(const double *xyz, const int64_t (*corner)[3], int64_t num)
