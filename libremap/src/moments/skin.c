@@ -8,33 +8,6 @@
 
 #include "moments/moments_private.h"
 
-bool rm_moments_coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b)
-{
-  const rm_trimesh *m = w->o->mesh[mesh_a], *k = w->o->mesh[mesh_b];
-  const rm_lid     *v = m->triangle[a];
-
-  for (int c = 0; c < 3; c++)
-    if (rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], k->vertex[k->triangle[b][c]]) != 0) return false;
-  return true;
-}
-
-int rm_moments_normal_sign(const rm_trimesh *m, rm_lid t, int axis)
-{
-  const rm_lid *v = m->triangle[t];
-  return rm_cross_sign(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[0]], m->vertex[v[2]], axis);
-}
-
-int rm_moments_axis(const rm_trimesh *m, rm_lid t)
-{
-  const double *n = m->normal[t];
-  int           k = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
-
-  if (fabs(n[2]) > fabs(n[k])) k = 2;
-  for (int h = 0; h < 3; h++, k = (k + 1) % 3)
-    if (rm_moments_normal_sign(m, t, k)) return k;
-  return -1;
-}
-
 /* ---- what two coplanar triangles have in common -------------------------------------------------------------------------- */
 
 /* The corners of a triangle, turned so that they run counterclockwise seen along the axis. */
