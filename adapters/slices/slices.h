@@ -89,8 +89,8 @@ int64_t rslice_cell_head(const rslice_content *content);
 /** May a file of that name be written? One without any write permission is not replaced, not even by root, nor is a link that
  *  leads nowhere. Not collective. 0, or an error number. */
 int rslice_file_check(const char *path);
-/** A new, empty file beside `path`, or beside what it links to, that is to get its name; its own goes to part. One rank calls. 0,
- *  or an error number. */
+/** A new, empty file beside `path`, or beside what it links to, that is to get its name; its own goes to part. One rank calls.
+ *  0, or an error number. */
 int rslice_file_begin(const char *path, char *part, size_t size);
 /** Claim so many bytes of disk, so that later writes cannot find it full. One rank calls. 0, or an error number. */
 int rslice_file_claim(const char *part, int64_t bytes);

@@ -1,5 +1,5 @@
-/* One rank makes another call than the others, or passes other arguments where all must agree: nobody waits for ever, those that
- * differ are told, and the next call that all make alike works as if nothing had happened. */
+/* One rank makes another call than the others, or passes other arguments where all must agree: nobody waits for ever, those
+ * that differ are told, and the next call that all make alike works as if nothing had happened. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
@@ -17,7 +17,7 @@ static void open_world(world *w, int n)
   RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &w->ctx), REMAP_OK);
   for (int side = 0; side < 2; side++) {
     static const double away[12] = {1, 0, 0, .3, 0, 1, 0, .2, 0, 0, 1, -.1};
-    tm_mesh *whole = tm_hexahedra((int[]){n, n, n + side}, tm_warp, &(tm_warping){0.03, 0.7});
+    tm_mesh            *whole    = tm_hexahedra((int[]){n, n, n + side}, tm_warp, &(tm_warping){0.03, 0.7});
 
     if (side) tm_move(whole, tm_affine, away);
     int *deal     = tm_deal(whole, rt_size(), TM_SLABS, 0);
@@ -50,7 +50,8 @@ static remap_status transfer(world *w, int d, int order, remap_limiter limiter, 
   t.order   = order;
   t.limiter = limiter;
   for (int k = 0; k < num; k++)
-    f[k] = (remap_field_desc){.nature = REMAP_CONSERVED, .has_old = 1, .in = w->u[in] + k * n[0], .out = w->got[out] + k * n[1]};
+    f[k] =
+        (remap_field_desc){.nature = REMAP_CONSERVED, .has_old = 1, .in = w->u[in] + k * n[0], .out = w->got[out] + k * n[1]};
   if (how == WITHOUT || how == WITH) return remap_field(w->ctx, (remap_direction)d, &t, num, f, how == WITH ? report : NULL);
   const remap_status status = remap_field_start(w->ctx, (remap_direction)d, &t, num, f);
   return status != REMAP_OK ? status : remap_field_finish(w->ctx, (remap_direction)d, how == HALVES_WITH ? report : NULL);

@@ -1,12 +1,12 @@
 /* remap_move against a fresh build of the meshes where they went: the same bits of pairs, coverage, statistics and fields, for
- * one mesh or both, by coordinates or by a matrix, for steps so small that much is kept and for jumps; what it refuses; and that
- * memory does not grow. */
+ * one mesh or both, by coordinates or by a matrix, for steps so small that much is kept and for jumps; what it refuses; and
+ * that memory does not grow. */
 #include <remap/remap.h>
 #include <malloc.h>
 #include "meshes.h"
 #include "rt.h"
 
-/* ---- memory that the library holds: counted by the linker's --wrap -------------------------------------------------------- */
+/* ---- memory that the library holds: counted by the linker's --wrap ---------------------------------------------- */
 
 static int64_t held;
 void *__real_malloc(size_t size);

@@ -20,7 +20,7 @@ void *__wrap_calloc(size_t n, size_t size) { return taken++, __real_calloc(n, si
 void *__wrap_realloc(void *old, size_t size) { return taken++, __real_realloc(old, size); }
 void *__wrap_aligned_alloc(size_t alignment, size_t size) { return taken++, __real_aligned_alloc(alignment, size); }
 
-/* ---- calls of MPI that it makes: counted by MPI's profiling interface ------------------------------------------------------ */
+/* ---- calls of MPI that it makes: counted by MPI's profiling interface -------------------------------------------- */
 
 static struct calls {
   long collective, to[16]; /* messages to each rank */
@@ -209,8 +209,8 @@ static void transfers_after_the_first_take_no_memory(void)
   close_world(&w);
 }
 
-/* After the first transfer a rank sends each of its peers a message per round, or two if items are many, and there is no collective
- * call. */
+/* After the first transfer a rank sends each of its peers a message per round, or two if items are many, and there is no
+ * collective call. */
 static void transfers_after_the_first_are_exchanges_with_neighbours(void)
 {
   static const int rounds[3] = {1, 2, 6}; /* given; halo; slopes, roughness thrice */

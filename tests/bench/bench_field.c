@@ -1,6 +1,7 @@
-/* bench_field -- one field on an existing overlay: what a transfer costs a solver in every step. Times of remap_field by order and
- * limiter, then, of the same messages (order 1, one number per giving cell) without the library, by isend and irecv as it has them,
- * by persistent requests and by a neighbourhood collective. Microseconds, medians over the repeats, the slowest rank's. One JSON line.
+/* bench_field -- one field on an existing overlay: what a transfer costs a solver in every step. Times of remap_field by order
+ * and limiter, then, of the same messages (order 1, one number per giving cell) without the library, by isend and irecv as it
+ * has them, by persistent requests and by a neighbourhood collective. Microseconds, medians over the repeats, the slowest
+ * rank's. One JSON line.
  *
  *   mpirun -n P bench_field [N] [REPEATS]      N^3 cells to (N + 1)^3 warped ones; default 32, 200 */
 #include <remap/remap.h>
@@ -11,7 +12,7 @@ enum { WAYS = 3 };
 
 typedef struct world {
   remap_context *ctx;
-  int            rank, size, num; /* neighbours */
+  int            rank, size, num;            /* neighbours */
   int           *neighbour, *count, *offset; /* [num], items that come from each */
   double        *u, *v, *in, *out;
   int64_t        cells[2];
@@ -58,13 +59,13 @@ static remap_status open_world(world *w, int n)
 static remap_status find_neighbours(world *w)
 {
   remap_pairs_view   pairs;
-  const remap_status status = remap_pairs(w->ctx, REMAP_FORWARD, &pairs);
+  const remap_status status    = remap_pairs(w->ctx, REMAP_FORWARD, &pairs);
   int                num_items = 0;
 
   w->neighbour = tm_alloc_(w->size, sizeof(int)), w->count = tm_alloc_(w->size, sizeof(int));
   w->offset = tm_alloc_(w->size + 1, sizeof(int));
   if (status != REMAP_OK) return status;
-  int *items = tm_alloc_(2 * w->size, sizeof *items), *back = items + w->size;
+  int    *items = tm_alloc_(2 * w->size, sizeof *items), *back = items + w->size;
   int64_t last = -1;
   for (int64_t k = 0; k < pairs.row_offset[pairs.num_rows]; k++) {
     items[pairs.owner_rank[k]] += pairs.owner_rank[k] != w->rank && pairs.global_cell[k] != last;
@@ -103,8 +104,8 @@ static void time_messages(world *w, int repeats, double *seconds, double best[WA
   MPI_Request *request = malloc((size_t)(2 * w->num + 1) * sizeof *request);
   MPI_Comm     graph;
 
-  MPI_Dist_graph_create_adjacent(MPI_COMM_WORLD, w->num, w->neighbour, w->count, w->num, w->neighbour, w->count, MPI_INFO_NULL, 0,
-                                 &graph);
+  MPI_Dist_graph_create_adjacent(MPI_COMM_WORLD, w->num, w->neighbour, w->count, w->num, w->neighbour, w->count, MPI_INFO_NULL,
+                                 0, &graph);
   for (int way = 0; way < WAYS; way++) {
     for (int i = 0; i < w->num && way == 1; i++) {
       MPI_Recv_init(w->in + w->offset[i], w->count[i], MPI_DOUBLE, w->neighbour[i], 0, MPI_COMM_WORLD, &request[i]);
@@ -125,9 +126,14 @@ static void time_messages(world *w, int repeats, double *seconds, double best[WA
 
 int main(int argc, char **argv)
 {
-  static const struct { const char *name; int order; remap_limiter limiter; } kind[] = {
-      {"order_1", 1, REMAP_LIMITER_NONE}, {"order_2", 2, REMAP_LIMITER_NONE}, {"barth_jespersen", 2, REMAP_LIMITER_BARTH_JESPERSEN},
-      {"auto", 2, REMAP_LIMITER_AUTO}};
+  static const struct {
+    const char   *name;
+    int           order;
+    remap_limiter limiter;
+  } kind[]       = {{"order_1", 1, REMAP_LIMITER_NONE},
+                    {"order_2", 2, REMAP_LIMITER_NONE},
+                    {"barth_jespersen", 2, REMAP_LIMITER_BARTH_JESPERSEN},
+                    {"auto", 2, REMAP_LIMITER_AUTO}};
   const int    n = argc > 1 ? atoi(argv[1]) : 32, repeats = argc > 2 ? atoi(argv[2]) : 200;
   double      *seconds = tm_alloc_(repeats, sizeof *seconds), us[4] = {0}, message[WAYS] = {0};
   world        w = {0};
@@ -156,8 +162,8 @@ int main(int argc, char **argv)
     printf("{\"bench\":\"field\",\"ranks\":%d,\"cells\":%d,\"neighbours\":%d,\"items\":%d", w.size, n * n * n, w.num,
            w.num ? w.offset[w.num - 1] + w.count[w.num - 1] : 0);
     for (int t = 0; t < 4; t++) printf(",\"us_%s\":%.1f", kind[t].name, us[t]);
-    printf(",\"us_messages_isend\":%.1f,\"us_messages_persistent\":%.1f,\"us_messages_neighbour\":%.1f}\n", message[0], message[1],
-           message[2]);
+    printf(",\"us_messages_isend\":%.1f,\"us_messages_persistent\":%.1f,\"us_messages_neighbour\":%.1f}\n", message[0],
+           message[1], message[2]);
   }
   if (w.rank == 0 && status != REMAP_OK) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(w.ctx));
   remap_destroy(&w.ctx);

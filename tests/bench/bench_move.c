@@ -1,8 +1,9 @@
 /* bench_move -- a cylinder zone that rotates in a box: what a step costs by remap_move and by a fresh remap_build of the same
- * position, with the first transfers both ways, which prepare, and without; and a transfer after that. CPU time of the slowest rank,
- * medians over the steps. One JSON line.
+ * position, with the first transfers both ways, which prepare, and without; and a transfer after that. CPU time of the slowest
+ * rank, medians over the steps. One JSON line.
  *
- *   mpirun -n P bench_move [N] [STEPS] [TOP]    box of N^3 cells, zone of as many per length, up to that height; default 32, 50,
+ *   mpirun -n P bench_move [N] [STEPS] [TOP]    box of N^3 cells, zone of as many per length, up to that height; default 32,
+ *   50,
  *                                               0.743; at 0.75 the zone ends in a plane of the box's faces */
 #include <remap/remap.h>
 #include <stdio.h>
@@ -30,7 +31,8 @@ static double median(double *x, int n)
   return x[n / 2];
 }
 
-/* The unit cube to a ring of radii 0.08 and 0.3 about (0.5, 0.5), a third of the circle per third of y: z from 0.26 to *data. */
+/* The unit cube to a ring of radii 0.08 and 0.3 about (0.5, 0.5), a third of the circle per third of y: z from 0.26 to *data.
+ * */
 static void to_ring(double xyz[3], const void *data)
 {
   const double r = .08 + .22 * xyz[0], angle = 2 * M_PI * xyz[1];

@@ -187,8 +187,8 @@ static void flows_bring_items_and_the_worst_status_of_their_senders(void)
   rm_comm_free(&comm);
 }
 
-/* The last rank says something else, and sends items of another size: it and its peers are apart from each other, nobody else is,
- * and all of it is forgotten in the next run. */
+/* The last rank says something else, and sends items of another size: it and its peers are apart from each other, nobody else
+ * is, and all of it is forgotten in the next run. */
 static void who_says_something_else_is_apart_from_its_peers(void)
 {
   for (int64_t chunk = 30; chunk <= 1 << 20; chunk *= 1 << 15) {

@@ -439,9 +439,10 @@ REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction
  *  and sends the first; it waits for nobody, unless it prepares (see remap_field). The finish does the rest and writes.
  *  fields and transfer are copied and values of `in` read by the start; `out` is lent until the finish and must not change.
  *  One transfer in each direction and context may be under way; all ranks start and finish them in the same order, and none
- *  builds, moves or masks in between, or calls remap_field where others call the halves. A start that fails leaves nothing under
- *  way on this rank; others, whose arguments are sound, hear of it in the finish. What is wrong with this rank's own values is told
- *  by the finish. In halves, each rank also exchanges a note with three ranks at most about reports, which agree as in remap_field.
+ *  builds, moves or masks in between, or calls remap_field where others call the halves. A start that fails leaves nothing
+ *  under way on this rank; others, whose arguments are sound, hear of it in the finish. What is wrong with this rank's own
+ *  values is told by the finish. In halves, each rank also exchanges a note with three ranks at most about reports, which agree
+ *  as in remap_field.
  *  Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
 REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
                                          int num_fields, const remap_field_desc *fields);

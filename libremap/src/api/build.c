@@ -1,5 +1,5 @@
-/* build -- remap_build and remap_move: the stages in order, one agreement each. What only the overlay needs lives in an arena that
- * ends with it. */
+/* build -- remap_build and remap_move: the stages in order, one agreement each. What only the overlay needs lives in an arena
+ * that ends with it. */
 #include "api/context.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
-/* call -- how a call begins that all ranks make: each tells its peers which one it makes, so that ranks which make different ones
- * are told instead of waiting for each other. Peers are a few ranks of a tree, at first; transfers add those that they exchange
- * messages with. */
+/* call -- how a call begins that all ranks make: each tells its peers which one it makes, so that ranks which make different
+ * ones are told instead of waiting for each other. Peers are a few ranks of a tree, at first; transfers add those that they
+ * exchange messages with. */
 #include "api/context.h"
 
 #include <stdarg.h>
@@ -19,15 +19,13 @@ remap_status rm_context_fail(remap_context *ctx, remap_status status, const char
 remap_status rm_context_check_view(remap_context *ctx, bool is_good, const char *function)
 {
   ctx->message[0] = '\0';
-  if (!is_good) return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "%s: a pointer is NULL, or a side or direction is none", function);
+  if (!is_good)
+    return rm_context_fail(ctx, REMAP_BAD_ARGUMENT, "%s: a pointer is NULL, or a side or direction is none", function);
   if (!ctx->is_built) return rm_context_fail(ctx, REMAP_BAD_ORDER, "%s needs a successful remap_build", function);
   return REMAP_OK;
 }
 
-uint64_t rm_context_mark(rm_call call, int detail)
-{
-  return rm_hash_word(rm_hash_word((uint64_t)call) ^ (uint64_t)detail);
-}
+uint64_t rm_context_mark(rm_call call, int detail) { return rm_hash_word(rm_hash_word((uint64_t)call) ^ (uint64_t)detail); }
 
 remap_status rm_context_enter(remap_context *ctx, rm_call call, int detail, rm_reason *reason)
 {

@@ -30,8 +30,8 @@ typedef struct rm_place {
 
 /* Calls that all ranks make together, or among neighbours. */
 typedef enum rm_call {
-  RM_CALL_BUILD = 1, RM_CALL_MOVE, RM_CALL_MASKS, RM_CALL_AGREE, RM_CALL_PARTIAL_CELLS, RM_CALL_SUPERMESH, RM_CALL_FIRST_TRANSFER,
-  RM_CALL_LARGER_TRANSFER, RM_CALL_REFUSED_TRANSFER, RM_CALL_FINISH
+  RM_CALL_BUILD = 1, RM_CALL_MOVE, RM_CALL_MASKS, RM_CALL_AGREE, RM_CALL_PARTIAL_CELLS, RM_CALL_SUPERMESH,
+  RM_CALL_FIRST_TRANSFER, RM_CALL_LARGER_TRANSFER, RM_CALL_REFUSED_TRANSFER, RM_CALL_FINISH
 } rm_call;
 
 struct remap_context {
@@ -92,8 +92,8 @@ remap_status rm_context_check_view(remap_context *ctx, bool is_good, const char 
 /* The mark of a call that must agree on a detail. */
 uint64_t rm_context_mark(rm_call call, int detail);
 
-/* What a collective call begins with. BAD_ARGUMENT unless every rank makes the same one with the same detail; nobody waits for a
- * rank that makes another. */
+/* What a collective call begins with. BAD_ARGUMENT unless every rank makes the same one with the same detail; nobody waits for
+ * a rank that makes another. */
 remap_status rm_context_enter(remap_context *ctx, rm_call call, int detail, rm_reason *reason);
 
 /* The same, and then one status for all, as rm_comm_agree_reason. */
@@ -113,12 +113,12 @@ void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason
 remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side, int num_blocks, const remap_mesh *block,
                                     remap_mesh *out, rm_layout *layout, rm_reason *reason);
 
-/* Read the meshes that are new, keep the other one as it is where that is possible; is_new becomes true for what was read after all.
- * Collective. What is not kept lives in passing. */
+/* Read the meshes that are new, keep the other one as it is where that is possible; is_new becomes true for what was read after
+ * all. Collective. What is not kept lives in passing. */
 remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena *passing, rm_reason *reason);
 
-/* Bring the cells of both meshes to where they are overlaid, unless they are there already: is_new[side], the mesh is not as it was
- * at the last call. Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
+/* Bring the cells of both meshes to where they are overlaid, unless they are there already: is_new[side], the mesh is not as it
+ * was at the last call. Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena *passing, rm_reason *reason);
 
 /* Triangulate what is there of one side, unless that is done already. Not collective. TOO_LARGE, NO_MEMORY. */

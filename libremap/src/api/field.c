@@ -74,8 +74,9 @@ typedef enum reporting { WITHOUT_REPORTS, WITH_REPORTS, IN_HALVES } reporting;
 static uint64_t mark_of(remap_direction direction, const remap_transfer *how, int num_fields, const remap_field_desc *fields,
                         reporting reports)
 {
-  const int    words[9] = {(int)direction,       how->order, (int)how->limiter,   (int)how->on_uncovered,   (int)how->on_partial,
-                           num_fields, how->allow_nan != 0, how->rotation != NULL, (int)reports};
+  const int    words[9] = {(int)direction,       how->order, (int)how->limiter,   (int)how->on_uncovered,
+                           (int)how->on_partial, num_fields, how->allow_nan != 0, how->rotation != NULL,
+                           (int)reports};
   const double gas[2]   = {how->gamma, how->gas_constant};
   uint64_t     hash     = 0, bits[2];
 
@@ -205,8 +206,8 @@ static remap_status prepare(remap_context *ctx, remap_direction direction, rm_lo
 }
 
 /* Transfers that need more than is there prepare it together. Collective; mine is the status of what only this rank passes. */
-static remap_status prepare_together(remap_context *ctx, remap_direction direction, rm_load load, uint64_t mark, remap_status mine,
-                                     rm_reason *reason)
+static remap_status prepare_together(remap_context *ctx, remap_direction direction, rm_load load, uint64_t mark,
+                                     remap_status mine, rm_reason *reason)
 {
   if (ctx->carrier[direction]) RM_TRY(rm_context_enter(ctx, RM_CALL_LARGER_TRANSFER, (int)direction, reason));
   RM_TRY(rm_comm_agree_reason(&ctx->comm, mine, reason));
@@ -243,7 +244,7 @@ static remap_status start(remap_context *ctx, remap_direction direction, const r
   const rm_transfer_setup setup = setup_of(ctx, direction, false);
   const rm_load           load  = rm_load_of(&setup, &how, num_fields, fields);
   const uint64_t          mark  = mark_of(direction, &how, num_fields, fields, reports);
-  mine = check_own(ctx, direction, num_fields, fields, reason);
+  mine                          = check_own(ctx, direction, num_fields, fields, reason);
   if (!ctx->carrier[direction] || !rm_load_covers(ctx->load[direction], load))
     RM_TRY(prepare_together(ctx, direction, load, mark, mine, reason));
   rm_carrier_start(ctx->carrier[direction], &how, num_fields, fields, mark, mine, reason);

@@ -4,12 +4,13 @@
  *   routes          while no two cells that meet are kept apart by them
  *   piece, triangles of a mesh that has not moved, while routes hold (triangles: and the frame)
  *
- * Routes are chosen for target cells whose boxes are widened by a margin. As long as the boxes of both meshes' cells together have
- * grown out of what they were by no more than that, every source cell that meets a target cell is where that one is: one reduction
- * tells. More source cells than are needed change no result. The margin follows the pace of the motion and is 0 for a build, or
- * where cells move by much of their size at once.
+ * Routes are chosen for target cells whose boxes are widened by a margin. As long as the boxes of both meshes' cells together
+ * have grown out of what they were by no more than that, every source cell that meets a target cell is where that one is: one
+ * reduction tells. More source cells than are needed change no result. The margin follows the pace of the motion and is 0 for a
+ * build, or where cells move by much of their size at once.
  *
- * O(n) time for what is made anew, besides two numbers per cell that moved; kept are 48 bytes per cell, and pieces and triangles. */
+ * O(n) time for what is made anew, besides two numbers per cell that moved; kept are 48 bytes per cell, and pieces and
+ * triangles. */
 #include "api/context.h"
 
 #include <math.h>
@@ -50,8 +51,8 @@ static remap_status find_approach(const remap_context *ctx, double *out)
   return REMAP_OK;
 }
 
-/* The margin for routes that are chosen now, from how far cells came in num_moves moves. Zones of one mesh are held against each
- * other among the cells of a piece, which are then those of a build. */
+/* The margin for routes that are chosen now, from how far cells came in num_moves moves. Zones of one mesh are held against
+ * each other among the cells of a piece, which are then those of a build. */
 static double choose_margin(const remap_context *ctx, double approach, int num_moves)
 {
   double size = INFINITY; /* of a cell */
@@ -68,16 +69,17 @@ static double choose_margin(const remap_context *ctx, double approach, int num_m
 /* Room for a new choice, and the boxes of now. Not collective. */
 static remap_status open_place(remap_context *ctx, double margin, rm_arena *passing, rm_mesh *widened)
 {
-  rm_place *place         = &ctx->place;
-  double  (*box)[6];
-  const rm_mesh *target   = ctx->mesh[REMAP_TARGET];
+  rm_place *place = &ctx->place;
+  double(*box)[6];
+  const rm_mesh *target = ctx->mesh[REMAP_TARGET];
 
   place->arena  = rm_arena_new();
   place->margin = margin;
   if (!place->arena) return REMAP_NO_MEMORY;
   for (int side = 0; side < 2; side++) {
     RM_NEW(box, place->arena, ctx->mesh[side]->num_cells);
-    if (ctx->mesh[side]->num_cells > 0) memcpy(box, ctx->mesh[side]->cell_box, (size_t)ctx->mesh[side]->num_cells * sizeof *box);
+    if (ctx->mesh[side]->num_cells > 0)
+      memcpy(box, ctx->mesh[side]->cell_box, (size_t)ctx->mesh[side]->num_cells * sizeof *box);
     place->box[side] = (const double(*)[6])box;
   }
   RM_NEW(box, passing, target->num_cells);
@@ -156,5 +158,6 @@ remap_status rm_context_triangulate(remap_context *ctx, int side)
   rm_context_drop_triangles(ctx, side);
   place->triangle_arena[side] = rm_arena_new();
   if (!place->triangle_arena[side]) return REMAP_NO_MEMORY;
-  return rm_trimesh_build(place->triangle_arena[side], &ctx->frame, &place->part.piece[side], ctx->options.faces, &place->trimesh[side]);
+  return rm_trimesh_build(place->triangle_arena[side], &ctx->frame, &place->part.piece[side], ctx->options.faces,
+                          &place->trimesh[side]);
 }

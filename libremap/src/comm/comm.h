@@ -69,14 +69,14 @@ typedef struct rm_peers {
   int        num;
   const int *rank; /* [num] ascending, without this rank */
 } rm_peers;
-/* The tree, and the neighbours of num_plans plans, which may be NULL. Not collective, but mutual if all ranks call it for the same
- * plans. Lives in arena. NO_MEMORY. */
+/* The tree, and the neighbours of num_plans plans, which may be NULL. Not collective, but mutual if all ranks call it for the
+ * same plans. Lives in arena. NO_MEMORY. */
 remap_status rm_peers_build(rm_arena *arena, const rm_comm *comm, int num_plans, const rm_plan *const *plan,
                             const rm_peers **out);
 
-/* parley -- before ranks go on together each tells its peers by a mark what it is about to do, and goes on only with those of the
- * same mark; the others are apart from it, as it is from them. So a call that differs between ranks is noticed at both ends, and
- * nobody waits for one that does something else. Its memory is taken once. */
+/* parley -- before ranks go on together each tells its peers by a mark what it is about to do, and goes on only with those of
+ * the same mark; the others are apart from it, as it is from them. So a call that differs between ranks is noticed at both
+ * ends, and nobody waits for one that does something else. Its memory is taken once. */
 typedef struct rm_parley {
   const rm_peers *peers;
   uint8_t        *is_apart;  /* [num] 1: said something else when the parley was last held */
@@ -89,11 +89,11 @@ typedef struct rm_parley {
 remap_status rm_parley_init(rm_arena *arena, const rm_peers *peers, rm_parley *out);
 /* Tell all peers and hear them. By all ranks; waits for peers only. BAD_ARGUMENT if one is apart. */
 remap_status rm_parley_hold(const rm_comm *comm, rm_parley *parley, uint64_t mark);
-/* Tell those of the tree that are not apart how to go on, and hear them. By all ranks that go on; waits for these only. BAD_ARGUMENT
- * if one is apart from now on. */
+/* Tell those of the tree that are not apart how to go on, and hear them. By all ranks that go on; waits for these only.
+ * BAD_ARGUMENT if one is apart from now on. */
 remap_status rm_parley_confirm(const rm_comm *comm, rm_parley *parley, uint64_t mark);
-/* Does everybody agree? By all ranks of one mark after a parley: *all is true on every rank of the communicator or on none of those
- * that call this; true if nobody is apart from anybody. */
+/* Does everybody agree? By all ranks of one mark after a parley: *all is true on every rank of the communicator or on none of
+ * those that call this; true if nobody is apart from anybody. */
 remap_status rm_parley_all(const rm_comm *comm, const rm_parley *parley, bool *all);
 
 /* flow -- a plan run in two steps, so that other work fits between, with a note in front of every message. Its memory is taken
@@ -118,12 +118,13 @@ typedef struct rm_flow {
 
 /* Room for runs of at most `most` bytes per item. Not collective. Lives in arena. NO_MEMORY. */
 remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size_t most, rm_flow *out);
-/* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards. parley
- * may be NULL: then everybody is there. */
+/* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards.
+ * parley may be NULL: then everybody is there. */
 remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,
                           rm_note note);
-/* Wait until this rank has received and sent; flow->received then holds the items. The status in note becomes the greatest of its
- * own and the senders'. BAD_ARGUMENT if somebody turned out to be apart, or sends another number of items; items of such are 0. */
+/* Wait until this rank has received and sent; flow->received then holds the items. The status in note becomes the greatest of
+ * its own and the senders'. BAD_ARGUMENT if somebody turned out to be apart, or sends another number of items; items of such
+ * are 0. */
 remap_status rm_flow_wait(const rm_comm *comm, rm_flow *flow, rm_parley *parley, rm_note *note);
 
 #endif

@@ -14,8 +14,8 @@ static inline remap_status rm_comm_status(int mpi)
   return mpi == MPI_SUCCESS ? REMAP_OK : REMAP_MPI_FAILURE;
 }
 
-/* As rm_comm_allgather, rm_comm_allgatherv, rm_comm_exchange, rm_plan_run and rm_flow_init, with messages of at most chunk bytes,
- * 1 <= chunk <= RM_COMM_CHUNK, the same on every rank. */
+/* As rm_comm_allgather, rm_comm_allgatherv, rm_comm_exchange, rm_plan_run and rm_flow_init, with messages of at most chunk
+ * bytes, 1 <= chunk <= RM_COMM_CHUNK, the same on every rank. */
 remap_status rm_comm_allgather_chunked(const rm_comm *comm, int64_t chunk, const void *mine, void *all, int64_t n, size_t size);
 remap_status rm_comm_allgatherv_chunked(const rm_comm *comm, int64_t chunk, rm_arena *arena, const void *mine, int64_t n,
                                         size_t size, int64_t *offset, void **all);
@@ -25,8 +25,9 @@ remap_status rm_plan_run_chunked(const rm_comm *comm, int64_t chunk, const rm_pl
                                  void *received, void *buffer);
 remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out);
 
-/* Tags of messages. Whoever says something says it first with RM_TAG_FIRST, in a message of RM_FIRST_BYTES at most, for which there
- * is always room; what is longer follows, with a tag from RM_TAG_REST on that tells what is under way from everything else. */
+/* Tags of messages. Whoever says something says it first with RM_TAG_FIRST, in a message of RM_FIRST_BYTES at most, for which
+ * there is always room; what is longer follows, with a tag from RM_TAG_REST on that tells what is under way from everything
+ * else. */
 enum { RM_TAG_FIRST = 3, RM_TAG_TREE = 4, RM_TAG_APART = 5, RM_TAG_REST = 8, RM_FIRST_BYTES = 1024 };
 
 /* Tell the peers that are none of plan's (which may be NULL) neighbours and not apart this note, and listen to them. */

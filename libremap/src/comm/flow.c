@@ -1,7 +1,7 @@
-/* flow -- an exchange among neighbours in two steps. Everything is posted at once, what is sent and what is expected: a first message
- * per neighbour with a note, and the items if they are few; else the items by themselves. A neighbour that has another run in mind
- * is known by its note: then what was expected of it is called off, and what it sent taken away. What a rank wants from itself is
- * copied. O(data) time; memory for what is sent, the first messages, and the items in the plan's order. */
+/* flow -- an exchange among neighbours in two steps. Everything is posted at once, what is sent and what is expected: a first
+ * message per neighbour with a note, and the items if they are few; else the items by themselves. A neighbour that has another
+ * run in mind is known by its note: then what was expected of it is called off, and what it sent taken away. What a rank wants
+ * from itself is copied. O(data) time; memory for what is sent, the first messages, and the items in the plan's order. */
 #include "comm/comm_private.h"
 
 #include <string.h>
@@ -16,14 +16,20 @@ static int64_t num_pieces(int64_t bytes, int64_t chunk)
 static int first_bytes(int64_t bytes, int64_t chunk) { return num_pieces(bytes, chunk) > 0 ? NOTE : NOTE + (int)bytes; }
 
 /* Length of the piece that starts so many bytes into the items. */
-static int piece_bytes(int64_t bytes, int64_t done, int64_t chunk) { return (int)(bytes - done < chunk ? bytes - done : chunk); }
+static int piece_bytes(int64_t bytes, int64_t done, int64_t chunk)
+{
+  return (int)(bytes - done < chunk ? bytes - done : chunk);
+}
 
 /* Where the message of neighbour i starts among those side by side, and the bytes of its items. */
 static int64_t start_of(const int64_t *offset, int i, size_t size)
 {
   return rm_add_sat(rm_mul_sat(offset[i], (int64_t)size), (int64_t)i * NOTE);
 }
-static int64_t bytes_of(const int64_t *offset, int i, size_t size) { return rm_mul_sat(offset[i + 1] - offset[i], (int64_t)size); }
+static int64_t bytes_of(const int64_t *offset, int i, size_t size)
+{
+  return rm_mul_sat(offset[i + 1] - offset[i], (int64_t)size);
+}
 
 remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out)
 {
@@ -97,8 +103,7 @@ static remap_status expect(const rm_comm *comm, rm_flow *flow, const rm_parley *
   flow->first[i] = MPI_REQUEST_NULL;
   flow->rest[i]  = flow->num_requests;
   if (rank == comm->rank || is_apart(parley, rank)) return REMAP_OK;
-  RM_TRY(rm_comm_status(
-      MPI_Irecv(flow->arrived[i], RM_FIRST_BYTES, MPI_BYTE, rank, RM_TAG_FIRST, comm->mpi, &flow->first[i])));
+  RM_TRY(rm_comm_status(MPI_Irecv(flow->arrived[i], RM_FIRST_BYTES, MPI_BYTE, rank, RM_TAG_FIRST, comm->mpi, &flow->first[i])));
   return post_pieces(comm, flow, false, rank, tag_of(flow, mark), place_of(flow, i),
                      bytes_of(flow->plan->recv_offset, i, flow->size));
 }
@@ -152,8 +157,8 @@ remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley,
   return REMAP_OK;
 }
 
-/* Listen to a neighbour's first message: if it is apart that is noted, what it was expected to send called off, and what it did send
- * taken away. */
+/* Listen to a neighbour's first message: if it is apart that is noted, what it was expected to send called off, and what it did
+ * send taken away. */
 static remap_status hear(const rm_comm *comm, rm_flow *flow, rm_parley *parley, int i, rm_note *note)
 {
   const int     rank  = flow->plan->recv_rank[i];

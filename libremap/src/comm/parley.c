@@ -1,5 +1,5 @@
-/* parley -- ranks tell their peers what they are about to do. A note costs 24 bytes per peer; the question whether everybody agrees
- * goes up a binary tree and down again, 2 log2 P messages deep, along those of its edges whose ends said the same. */
+/* parley -- ranks tell their peers what they are about to do. A note costs 24 bytes per peer; the question whether everybody
+ * agrees goes up a binary tree and down again, 2 log2 P messages deep, along those of its edges whose ends said the same. */
 #include "comm/comm_private.h"
 
 #include <stdlib.h>
@@ -54,8 +54,10 @@ int rm_peers_find(const rm_peers *peers, int rank)
   while (low < high) {
     const int mid = low + (high - low) / 2;
 
-    if (peers->rank[mid] < rank) low = mid + 1;
-    else high = mid;
+    if (peers->rank[mid] < rank)
+      low = mid + 1;
+    else
+      high = mid;
   }
   RM_ASSERT(low < peers->num && peers->rank[low] == rank);
   return low;
