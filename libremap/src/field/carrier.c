@@ -63,11 +63,9 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
   const int64_t            num   = rm_mul_sat(setup->receiving->num_cells, c->load.num_fields);
 
   RM_NEW(c->kept, arena, num);
-  c->kept_number = c->kept;
   if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, num);
   c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, NULL, true};
   c->keeping.given  = c->kept;
-  c->keeping.number = c->kept_number;
   return rm_profile_init(arena, (int)setup->giving->side, &c->load, &c->keeping);
 }
 
@@ -81,7 +79,6 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
 
   RM_TRY(make_packing(arena, &c->load, &c->packing));
   RM_NEW(c->given, arena, rm_mul_sat(setup->giving->num_cells, n));
-  c->number = c->given;
   if (c->load.num_systems > 0) RM_NEW(c->number, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(c->value, arena, rm_mul_sat(setup->receiving->num_cells, n));
   RM_NEW(c->room, arena, 6 * (int64_t)n);
@@ -91,8 +88,7 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->fields, arena, n);
   c->giving.ground =
       (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure, false};
-  c->giving.given  = c->given;
-  c->giving.number = c->number;
+  c->giving.given = c->given;
   RM_TRY(rm_profile_init(arena, stream, &c->load, &c->giving));
   if (c->load.is_blended) RM_TRY(make_keeping(arena, c));
   if (c->load.is_settled) {
@@ -227,6 +223,8 @@ void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, 
   c->next.peers = NULL;
   for (int f = 0; f < num_fields; f++) c->fields[f] = fields[f];
   rm_packing_fill(&c->packing, &c->setup, &c->how, num_fields, c->fields);
+  c->giving.number  = c->packing.num_systems > 0 ? c->number : c->given;
+  c->keeping.number = c->packing.num_systems > 0 ? c->kept_number : c->kept;
   if (mine == REMAP_OK) rm_word_add(&c->word, gather(c));
   c->how.rotation = NULL; /* the caller's again */
   rm_profile_post(&c->giving, c->setup.comm, &c->packing, &c->word);
