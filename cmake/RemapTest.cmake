@@ -61,8 +61,8 @@ function(remap_test room thing)
   remap_mpi_test(${room} ${thing} ${exe} RANKS ${T_RANKS} TIMEOUT ${T_TIMEOUT})
 endfunction()
 
-# remap_bench(<thing> [HEAP] [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not run.
-# HEAP: it counts the memory that it and the library hold.
+# remap_bench(<thing> [HEAP] [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not
+# run. HEAP: it counts the memory that it and the library hold.
 function(remap_bench thing)
   cmake_parse_arguments(PARSE_ARGV 1 T "HEAP" "" "LIBS")
   add_executable(bench_${thing} bench/bench_${thing}.c)
@@ -73,8 +73,9 @@ function(remap_bench thing)
   endif()
 endfunction()
 
-# remap_fuzz(<thing> COUNT <inputs> [RANKS 1 2 ...] [LIBS <targets>]): tests/fuzz/fuzz_<thing>.c as the program fuzz_<thing>. CTest
-# lets it take every file of tests/fuzz/corpus/<thing> and so many inputs drawn by lot; with REMAP_FUZZERS it is run by hand.
+# remap_fuzz(<thing> COUNT <inputs> [RANKS 1 2 ...] [LIBS <targets>]): tests/fuzz/fuzz_<thing>.c as the program fuzz_<thing>.
+# CTest lets it take every file of tests/fuzz/corpus/<thing> and so many inputs drawn by lot; with REMAP_FUZZERS it is run by
+# hand.
 function(remap_fuzz thing)
   cmake_parse_arguments(PARSE_ARGV 1 T "" "COUNT" "RANKS;LIBS")
   add_executable(fuzz_${thing} fuzz/fuzz_${thing}.c)

@@ -21,7 +21,9 @@
 #include "meshes.h"
 #include "surfaces.h"
 
-#define BENCH_CASES "warped|general|finer|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer|surface|itself|cones|wedges"
+#define BENCH_CASES                                                                                                          \
+  "warped|general|finer|identical|nested|shifted|abutting|boxes|tetrahedra|dual|pancakes|graded|layer|surface|itself|cones|" \
+  "wedges"
 
 /* ---- clocks ------------------------------------------------------------------------------------------------------ */
 
@@ -182,7 +184,8 @@ static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
     const double by = shifted ? .5 / n : 1, m[12] = {1, 0, 0, by, 0, 1, 0, shifted ? by : 0, 0, 0, 1, shifted ? by : 0};
     mesh[0] = tm_hexahedra(coarse, NULL, NULL), mesh[1] = tm_hexahedra(coarse, tm_affine, m);
   } else if (!strcmp(name, "boxes")) {
-    mesh[0] = bench_placed_(tm_hexahedra(coarse, NULL, NULL), .3, .5), mesh[1] = bench_placed_(tm_hexahedra(fine, NULL, NULL), 0, 1);
+    mesh[0] = bench_placed_(tm_hexahedra(coarse, NULL, NULL), .3, .5),
+    mesh[1] = bench_placed_(tm_hexahedra(fine, NULL, NULL), 0, 1);
   } else if (!strcmp(name, "tetrahedra") || !strcmp(name, "dual")) {
     bench_maker_ *make = name[0] == 't' ? tm_tetrahedra : tm_dual;
     mesh[0] = bench_placed_(make(coarse, tm_warp, &first), .3, .5), mesh[1] = bench_placed_(make(fine, tm_warp, &second), 0, 1);

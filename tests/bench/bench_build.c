@@ -1,6 +1,7 @@
-/* bench_build -- a whole remap_build and one remap_field on the meshes of bench.h, on any number of ranks; cells are dealt in slabs.
- * One JSON line: medians of wall clock; bytes of heap that the library holds at the peak of remap_build, and afterwards, per target
- * cell; how far the resident size grew above that of the meshes; bytes of the plan per pair: pairs, V and M of both directions.
+/* bench_build -- a whole remap_build and one remap_field on the meshes of bench.h, on any number of ranks; cells are dealt in
+ * slabs. One JSON line: medians of wall clock; bytes of heap that the library holds at the peak of remap_build, and afterwards,
+ * per target cell; how far the resident size grew above that of the meshes; bytes of the plan per pair: pairs, V and M of both
+ * directions.
  *
  *   mpirun -n P bench_build CASE N diagonal|centre [REPEATS] */
 #include <remap/remap.h>
@@ -84,13 +85,17 @@ int main(int argc, char **argv)
   if (status != REMAP_OK && rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(ctx));
   peak = largest(peak) * size, kept = largest(kept) * size;
   if (status == REMAP_OK && rank == 0)
-    printf("{\"bench\":\"build\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"faces\":\"%s\",\"cells\":[%lld,%lld],\"pairs\":%lld,\"closure\":[%.1e,%.1e],"
-           "\"seconds_build\":%.3f,\"seconds_cpu\":%.3f,\"seconds_partition\":%.3f,\"seconds_overlay\":%.3f,\"us_build_per_source_cell\":%.2f,"
-           "\"seconds_field\":%.4f,\"peak_bytes_per_target_cell\":%.0f,\"kept_bytes_per_target_cell\":%.0f,\"peak_rss_bytes\":%.0f}\n",
-           argv[1], argv[2], size, argv[3], (long long)cells[0], (long long)cells[1], (long long)stats.pairs, stats.max_closure_error[0],
-           stats.max_closure_error[1], bench_median(t.build, repeats), bench_median(t.cpu, repeats), bench_median(t.partition, repeats),
-           bench_median(t.overlay, repeats), 1e6 * bench_median(t.cpu, repeats) / (double)cells[0], bench_median(t.field, repeats),
-           peak / (double)cells[1], kept / (double)cells[1], bench_rss_bytes());
+    printf("{\"bench\":\"build\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"faces\":\"%s\",\"cells\":[%lld,%lld],\"pairs\":%lld,"
+           "\"closure\":[%.1e,%.1e],"
+           "\"seconds_build\":%.3f,\"seconds_cpu\":%.3f,\"seconds_partition\":%.3f,\"seconds_overlay\":%.3f,\"us_build_per_"
+           "source_cell\":%.2f,"
+           "\"seconds_field\":%.4f,\"peak_bytes_per_target_cell\":%.0f,\"kept_bytes_per_target_cell\":%.0f,\"peak_rss_bytes\":%"
+           ".0f}\n",
+           argv[1], argv[2], size, argv[3], (long long)cells[0], (long long)cells[1], (long long)stats.pairs,
+           stats.max_closure_error[0], stats.max_closure_error[1], bench_median(t.build, repeats), bench_median(t.cpu, repeats),
+           bench_median(t.partition, repeats), bench_median(t.overlay, repeats),
+           1e6 * bench_median(t.cpu, repeats) / (double)cells[0], bench_median(t.field, repeats), peak / (double)cells[1],
+           kept / (double)cells[1], bench_rss_bytes());
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
   free(u), free(v), free(time);

@@ -1,5 +1,5 @@
-/* bench_openfoam -- write the meshes of a case as two OpenFOAM cases, FOLDER/source and FOLDER/target, with one uniform field, for
- * openfoam.sh. Internal faces come first, each owned by the lower of its cells, in the order of owners and neighbours.
+/* bench_openfoam -- write the meshes of a case as two OpenFOAM cases, FOLDER/source and FOLDER/target, with one uniform field,
+ * for openfoam.sh. Internal faces come first, each owned by the lower of its cells, in the order of owners and neighbours.
  *
  *   bench_openfoam CASE N FOLDER      cases: bench.h; the folders source/system, source/constant/polyMesh, source/0 ... must exist */
 #include "bench.h"
@@ -67,7 +67,8 @@ static void write_faces(const char *folder, const tm_mesh *m, const ranked *list
     const bool    turned = list[k].low != m->owner[f];
 
     fprintf(out, "%lld(", (long long)n);
-    for (int64_t h = 0; h < n; h++) fprintf(out, "%s%lld", h ? " " : "", (long long)m->face_node[first + (turned ? n - 1 - h : h)]);
+    for (int64_t h = 0; h < n; h++)
+      fprintf(out, "%s%lld", h ? " " : "", (long long)m->face_node[first + (turned ? n - 1 - h : h)]);
     fputs(")\n", out);
   }
   fputs(")\n", out);
@@ -112,9 +113,10 @@ int main(int argc, char **argv)
   for (int side = 0; side < 2; side++) {
     snprintf(folder, sizeof folder, "%s/%s", argv[3], name[side]);
     write_mesh(folder, mesh[side]);
-    write_text(folder, "system/controlDict", "dictionary",
-               "application none; startFrom startTime; startTime 0; stopAt endTime; endTime 1; deltaT 1; writeControl timeStep;\n"
-               "writeInterval 1; writeFormat ascii; writePrecision 8; timeFormat general; timePrecision 6;\n");
+    write_text(
+        folder, "system/controlDict", "dictionary",
+        "application none; startFrom startTime; startTime 0; stopAt endTime; endTime 1; deltaT 1; writeControl timeStep;\n"
+        "writeInterval 1; writeFormat ascii; writePrecision 8; timeFormat general; timePrecision 6;\n");
     write_text(folder, "system/fvSchemes", "dictionary",
                "ddtSchemes {} gradSchemes { default Gauss linear; } divSchemes {} laplacianSchemes {}\n"
                "interpolationSchemes { default linear; } snGradSchemes { default corrected; }\n");

@@ -1,7 +1,7 @@
-/* bench_overlay -- time and memory of the overlay stage by stage on one rank: triangulation, crossings and segments, volumes and
- * first moments of triangulated meshes in memory; "overlay" is the sum of the last two. One JSON line; microseconds of processor
- * time per cell of mesh 1, medians; wall clock of the overlay; bytes of heap that triangulation, overlay and moments take
- * together, at the peak, per cell of mesh 2; a hash of the bits of all V and M, whatever the order of the pairs.
+/* bench_overlay -- time and memory of the overlay stage by stage on one rank: triangulation, crossings and segments, volumes
+ * and first moments of triangulated meshes in memory; "overlay" is the sum of the last two. One JSON line; microseconds of
+ * processor time per cell of mesh 1, medians; wall clock of the overlay; bytes of heap that triangulation, overlay and moments
+ * take together, at the peak, per cell of mesh 2; a hash of the bits of all V and M, whatever the order of the pairs.
  *
  *   bench_overlay CASE N diagonal|centre [REPEATS]      cases: bench.h */
 #include "bench.h"
@@ -67,12 +67,15 @@ int main(int argc, char **argv)
   const rm_trace *trace = l->overlay->trace;
   const double    pairs = (double)l->moments->num_pairs;
   for (int k = 0; k < NUM_TIMES; k++) us[k] = 1e6 * bench_median(time + k * repeats, repeats) / cells[0];
-  printf("{\"bench\":\"overlay\",\"case\":\"%s\",\"n\":%s,\"faces\":\"%s\",\"cells\":[%d,%d],\"crossings\":%lld,\"segments\":%lld,\"pairs\":%.0f,"
-         "\"us_triangulation\":%.2f,\"us_crossings_segments\":%.2f,\"us_moments\":%.2f,\"us_overlay\":%.2f,\"us_overlay_wall\":%.2f,"
+  printf("{\"bench\":\"overlay\",\"case\":\"%s\",\"n\":%s,\"faces\":\"%s\",\"cells\":[%d,%d],\"crossings\":%lld,\"segments\":%"
+         "lld,\"pairs\":%.0f,"
+         "\"us_triangulation\":%.2f,\"us_crossings_segments\":%.2f,\"us_moments\":%.2f,\"us_overlay\":%.2f,\"us_overlay_wall\":"
+         "%.2f,"
          "\"us_per_pair\":%.3f,\"peak_bytes_per_target_cell\":%.0f,\"hash\":\"%016llx\"}\n",
          argv[1], argv[2], argv[3], cells[0], cells[1], (long long)(trace[0].num_crossings + trace[1].num_crossings),
-         (long long)(l->overlay->end_offset[l->mesh[0]->num_triangles] / 2), pairs, us[TRIANGULATION], us[TRACE], us[MOMENTS], us[OVERLAY],
-         us[WALL], pairs > 0 ? us[OVERLAY] * cells[0] / pairs : 0, peak / cells[1], (unsigned long long)hash_of(l->moments));
+         (long long)(l->overlay->end_offset[l->mesh[0]->num_triangles] / 2), pairs, us[TRIANGULATION], us[TRACE], us[MOMENTS],
+         us[OVERLAY], us[WALL], pairs > 0 ? us[OVERLAY] * cells[0] / pairs : 0, peak / cells[1],
+         (unsigned long long)hash_of(l->moments));
   laid_free(l);
   tm_free(mesh[0]), tm_free(mesh[1]);
   free(time);

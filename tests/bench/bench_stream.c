@@ -1,6 +1,6 @@
-/* bench_stream -- what one field costs on an existing mapping, and what one more costs in the same call, beside a plain stream over the
- * bytes that a transfer reads at least: index, V and M (order 1: no M) of every pair, the giving values and the receiving ones. One
- * JSON line: medians of wall clock in milliseconds, and the ratio of one more field to the stream.
+/* bench_stream -- what one field costs on an existing mapping, and what one more costs in the same call, beside a plain stream
+ * over the bytes that a transfer reads at least: index, V and M (order 1: no M) of every pair, the giving values and the
+ * receiving ones. One JSON line: medians of wall clock in milliseconds, and the ratio of one more field to the stream.
  *
  *   mpirun -n P bench_stream CASE N ORDER [REPEATS]      cases: bench.h; ORDER 1 or 2, without a limiter */
 #include <remap/remap.h>
@@ -55,7 +55,8 @@ int main(int argc, char **argv)
   const int64_t num[2] = {mine[0]->view.num_cells, mine[1]->view.num_cells};
   for (int64_t k = 0; k < MANY * num[0]; k++) value[0][k] = 1 + 1e-3 * (double)(k % 1000);
   for (int f = 0; f < MANY; f++)
-    field[f] = (remap_field_desc){.name = "u", .nature = REMAP_CONSERVED, .in = value[0] + f * num[0], .out = value[1] + f * num[1]};
+    field[f] =
+        (remap_field_desc){.name = "u", .nature = REMAP_CONSERVED, .in = value[0] + f * num[0], .out = value[1] + f * num[1]};
 
   remap_transfer how;
   double        *time = tm_alloc_(3 * repeats, sizeof *time), *many = time + repeats, *plain = many + repeats, once, sum = 0;
@@ -77,11 +78,13 @@ int main(int argc, char **argv)
   }
   if (status != REMAP_OK && rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(ctx));
   if (status == REMAP_OK && rank == 0 && sum > 0) {
-    const double one = 1e3 * bench_median(time, repeats), all = 1e3 * bench_median(many, repeats), bare = 1e3 * bench_median(plain, repeats);
-    printf("{\"bench\":\"stream\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"order\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,\"bytes\":%lld,\"ms_one\":%.3f,"
+    const double one = 1e3 * bench_median(time, repeats), all = 1e3 * bench_median(many, repeats),
+                 bare = 1e3 * bench_median(plain, repeats);
+    printf("{\"bench\":\"stream\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"order\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,"
+           "\"bytes\":%lld,\"ms_one\":%.3f,"
            "\"ms_one_of_%d\":%.3f,\"ms_one_more\":%.3f,\"ms_stream\":%.3f,\"ratio\":%.2f}\n",
-           argv[1], argv[2], size, order, (long long)num[0], (long long)num[1], (long long)stats.pairs, (long long)bytes, one, MANY, all / MANY,
-           (all - one) / (MANY - 1), bare, (all - one) / (MANY - 1) / bare);
+           argv[1], argv[2], size, order, (long long)num[0], (long long)num[1], (long long)stats.pairs, (long long)bytes, one,
+           MANY, all / MANY, (all - one) / (MANY - 1), bare, (all - one) / (MANY - 1) / bare);
   }
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]), free(value[side]);

@@ -1,11 +1,11 @@
 #!/bin/sh
-# ratio.sh -- the overlay's speed as ratios that machines share: beside the float prototype overlay_floor.c, case beside case, small
-# beside large. Programs run in turn, RUNS times; medians of processor time. Prints a table in Markdown.
+# ratio.sh -- the overlay's speed as ratios that machines share: beside the float prototype overlay_floor.c, case beside case,
+# small beside large. Programs run in turn, RUNS times; medians of processor time. Prints a table in Markdown.
 #
 #   tests/bench/ratio.sh BUILD [PROTOTYPE.c] [RUNS]
 #
-# BUILD is the build folder; PROTOTYPE.c defaults to ../shared/bench/overlay_floor.c beside the project, and rows that need it are left
-# out without it. RUNS defaults to 5. Takes about a minute and 2 GB.
+# BUILD is the build folder; PROTOTYPE.c defaults to ../shared/bench/overlay_floor.c beside the project, and rows that need it
+# are left out without it. RUNS defaults to 5. Takes about a minute and 2 GB.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 build=${1:?usage: ratio.sh BUILD [PROTOTYPE.c] [RUNS]}
@@ -25,21 +25,27 @@ for i in $(seq "$runs"); do
   done
 done
 
-# The middle one of the numbers of standard input; that of a field in the runs of a case; a ratio of two cases; a row of the table.
+# The middle one of the numbers of standard input. Of the runs of a case, that of the time per cell, and per pair. A row of the
+# table: what, unit, times, bar, stretch.
 median() { sort -g | awk '{ x[NR] = $1 } END { print x[int((NR + 1) / 2)] }'; }
-of() { sed "s/.*\"$2\":\([0-9.]*\).*/\1/" "$work/$1" | median; }
-row() { awk -v name="$1" -v unit="$2" -v a="$3" -v b="$4" -v bar="$5" -v stretch="$6" 'BEGIN {
-  printf "| %s | %s | %.3g | %.3g | %.2f | %s | %s |\n", name, unit, a, b, a / b, bar, stretch }'; }
+cell() { sed 's/.*"us_overlay":\([0-9.]*\).*/\1/' "$work/$1" | median; }
+pair() { sed 's/.*"us_per_pair":\([0-9.]*\).*/\1/' "$work/$1" | median; }
+row() {
+  awk -v name="$1" -v unit="$2" -v a="$3" -v b="$4" -v bar="$5" -v stretch="$6" 'BEGIN {
+    printf "| %s | %s | %.3g | %.3g | %.2f | %s | %s |\n", name, unit, a, b, a / b, bar, stretch }'
+}
 
 echo "| case | unit | it | against | ratio | bar | stretch |"
 echo "|---|---|---|---|---|---|---|"
+general=$(cell warped-32-diagonal)
+per_pair=$(pair warped-32-diagonal)
 if [ -x "$work/floor" ]; then
-  row "warped hexahedra, diagonal, against the prototype" "us/cell" "$(of warped-32-diagonal us_overlay)" "$(median <"$work/floor-diagonal")" 1.5 0.7
-  row "the same, centre" "us/cell" "$(of warped-32-centre us_overlay)" "$(median <"$work/floor-centre")" 1.0 0.5
+  row "warped hexahedra, diagonal, against the prototype" us/cell "$general" "$(median <"$work/floor-diagonal")" 1.5 0.7
+  row "the same, centre" us/cell "$(cell warped-32-centre)" "$(median <"$work/floor-centre")" 1.0 0.5
 fi
-row "planar boxes, against warped diagonal" "us/cell" "$(of boxes-32-diagonal us_overlay)" "$(of warped-32-diagonal us_overlay)" 0.6 0.35
-row "identical meshes, against general ones of that size" "us/cell" "$(of identical-24-diagonal us_overlay)" "$(of general-24-diagonal us_overlay)" 3 1.5
-row "nested meshes, against general ones of those sizes" "us/cell" "$(of nested-16-diagonal us_overlay)" "$(of finer-16-diagonal us_overlay)" 3 1.5
-row "tetrahedra, against warped diagonal" "us/pair" "$(of tetrahedra-16-diagonal us_per_pair)" "$(of warped-32-diagonal us_per_pair)" 1.0 0.8
-row "polyhedra (dual), against warped diagonal" "us/pair" "$(of dual-16-diagonal us_per_pair)" "$(of warped-32-diagonal us_per_pair)" - -
-row "64^3, against 16^3" "us/cell" "$(of general-64-diagonal us_overlay)" "$(of general-16-diagonal us_overlay)" 1.35 1.15
+row "planar boxes, against warped diagonal" us/cell "$(cell boxes-32-diagonal)" "$general" 0.6 0.35
+row "identical meshes, against general of that size" us/cell "$(cell identical-24-diagonal)" "$(cell general-24-diagonal)" 3 1.5
+row "nested meshes, against general of those sizes" us/cell "$(cell nested-16-diagonal)" "$(cell finer-16-diagonal)" 3 1.5
+row "tetrahedra, against warped diagonal" us/pair "$(pair tetrahedra-16-diagonal)" "$per_pair" 1.0 0.8
+row "polyhedra (dual), against warped diagonal" us/pair "$(pair dual-16-diagonal)" "$per_pair" - -
+row "64^3, against 16^3" us/cell "$(cell general-64-diagonal)" "$(cell general-16-diagonal)" 1.35 1.15

@@ -27,7 +27,8 @@ static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
 }
 
 /* Crossings, segments and the pairs they make, which stay in arena; the overlay itself ends here. Not collective. */
-static remap_status overlay_pairs(remap_context *ctx, rm_arena *arena, int64_t *crossings, const rm_moments **moments, rm_reason *reason)
+static remap_status overlay_pairs(remap_context *ctx, rm_arena *arena, int64_t *crossings, const rm_moments **moments,
+                                  rm_reason *reason)
 {
   const rm_progress progress = {ctx->options.progress, ctx->options.user};
   const rm_part    *part     = &ctx->place.part;
@@ -36,7 +37,8 @@ static remap_status overlay_pairs(remap_context *ctx, rm_arena *arena, int64_t *
   remap_status      status = own ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = rm_overlay_build(own, ctx->place.trimesh, part, &progress, &overlay, reason);
-  if (status == REMAP_OK) status = rm_moments_build(arena, part, overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments);
+  if (status == REMAP_OK)
+    status = rm_moments_build(arena, part, overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments);
   if (status == REMAP_OK) *crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
   rm_arena_drop(own);
   return status;

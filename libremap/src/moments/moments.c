@@ -1,13 +1,14 @@
 /* moments -- volumes and moments of all pairs, from segments and pieces of edges (DESIGN 2.4, 2.6).
  *
- * The boundary of i n j consists of polygons in the triangles of i and of j. Each polygon contributes the cone over it from an origin
- * O, summed over the polygon's sides p -> q: the signed volume of the tetrahedron (O, r, p, q), with r the foot of the perpendicular
- * from O on the triangle's plane. O is the centre of the box of cell i, and what j gains its neighbour beyond the polygon loses, so
- * that one product serves both; where j is much smaller than i, O is the centre of the meeting of their boxes. So all terms are of
- * the size of the smaller cell, wherever it lies. A point is its edge's first vertex plus lambda times the edge, and is taken relative
- * to O before anything is multiplied.
+ * The boundary of i n j consists of polygons in the triangles of i and of j. Each polygon contributes the cone over it from an
+ * origin O, summed over the polygon's sides p -> q: the signed volume of the tetrahedron (O, r, p, q), with r the foot of the
+ * perpendicular from O on the triangle's plane. O is the centre of the box of cell i, and what j gains its neighbour beyond the
+ * polygon loses, so that one product serves both; where j is much smaller than i, O is the centre of the meeting of their
+ * boxes. So all terms are of the size of the smaller cell, wherever it lies. A point is its edge's first vertex plus lambda
+ * times the edge, and is taken relative to O before anything is multiplied.
  *
- * Cost: two cones per segment and cell beside it in mesh 1, one per piece of an edge and triangle at it; 40 operations per cone. */
+ * Cost: two cones per segment and cell beside it in mesh 1, one per piece of an edge and triangle at it; 40 operations per
+ * cone. */
 #include "moments/moments_private.h"
 
 #include <math.h>
@@ -23,7 +24,8 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
   const double *a = w->o->mesh[0]->cell_box[i], *b = w->o->mesh[1]->cell_box[j];
   slot         *s;
 
-  if (w->num_slots == w->slots_room && (w->status = rm_grow(&w->slots, &w->slots_room, w->num_slots + 64, sizeof *w->slots))) return NULL;
+  if (w->num_slots == w->slots_room && (w->status = rm_grow(&w->slots, &w->slots_room, w->num_slots + 64, sizeof *w->slots)))
+    return NULL;
   s = &w->slots[w->num_slots];
   memset(s, 0, sizeof *s);
   s->target        = j;
@@ -41,7 +43,10 @@ static slot *new_slot(work *w, rm_lid i, rm_lid j)
   return s;
 }
 
-INLINE slot *find_slot(work *w, rm_lid i, rm_lid j) { return w->slot_of[j] >= 0 ? &w->slots[w->slot_of[j]] : new_slot(w, i, j); }
+INLINE slot *find_slot(work *w, rm_lid i, rm_lid j)
+{
+  return w->slot_of[j] >= 0 ? &w->slots[w->slot_of[j]] : new_slot(w, i, j);
+}
 
 /* ---- what a cone adds --------------------------------------------------------------------------------------------- */
 
@@ -53,8 +58,8 @@ INLINE double triple(const double n[3], const double p[3], const double q[3])
 static const int row_of[6] = {0, 1, 2, 0, 0, 1}, column_of[6] = {0, 1, 2, 1, 2, 2}; /* of second moments */
 
 /* 6 V, 24 M and, of ten sums, 120 S of the tetrahedron (O, r, p, q), with r = height n. */
-INLINE void cone(const double n[3], double height, const double r[3], const double p[3], const double q[3], double sign, int num_sums,
-                 double out[10])
+INLINE void cone(const double n[3], double height, const double r[3], const double p[3], const double q[3], double sign,
+                 int num_sums, double out[10])
 {
   double sum[3];
 
@@ -83,8 +88,8 @@ static void add_local(slot *s, double sign, const plane *pl, const point *p, con
 }
 
 /* One cone to both its slots. */
-INLINE void add_cone(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p, const point *q,
-                     int num_sums)
+INLINE void add_cone(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const point *p,
+                     const point *q, int num_sums)
 {
   double out[10];
 
@@ -135,13 +140,13 @@ INLINE void add_of_degree(work *w, rm_lid i, const rm_lid j[2], int kind, double
   }
 }
 
-INLINE void add(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
-                const point *q)
+INLINE void add(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                const point *p, const point *q)
 {
   add_of_degree(w, i, j, kind, sign, pl, other, p, q, 4);
 }
-INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
-                  const point *q)
+INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                  const point *p, const point *q)
 {
   add_of_degree(w, i, j, kind, sign, pl, other, p, q, 10);
 }
@@ -160,8 +165,12 @@ INLINE point crossing_point(const work *w, int mesh, const rm_crossing *x)
 {
   const rm_trimesh *m = w->o->mesh[mesh];
   const double     *v = m->vertex[m->edge[x->edge][0]], *u = m->vertex[m->edge[x->edge][1]], l = x->lambda;
-  point             p = {v, {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])}, {0, 0, 0}, mesh, x->edge, x->triangle / 2,
-                         x - w->o->trace[mesh].crossing};
+  point             p = {.base     = v,
+                         .delta    = {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])},
+                         .mesh     = mesh,
+                         .edge     = x->edge,
+                         .triangle = x->triangle / 2,
+                         .crossing = x - w->o->trace[mesh].crossing};
 
   relative(&p, w->centre, p.at);
   return p;
@@ -223,8 +232,9 @@ INLINE int piece_number(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell)
   return 0;
 }
 
-/* Pieces of an edge about which a cell winds equally often count as one: what cuts them are other cells that overlap this one, and
- * another rank need not have those. The number of the first piece behind those that begin with piece k; k if they began before. */
+/* Pieces of an edge about which a cell winds equally often count as one: what cuts them are other cells that overlap this one,
+ * and another rank need not have those. The number of the first piece behind those that begin with piece k; k if they began
+ * before. */
 INLINE rm_lid run_end(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell, int number)
 {
   if (k > 0 && piece_number(tr, e, k - 1, cell) == number) return k;
@@ -299,8 +309,8 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
       if (w->skin_only && !m->triangle_is_skin[b]) continue;
       const plane  pb = plane_of(w, 1, b);
 
-      add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0), (m->star[z] & 3) == 2 ? -number : number,
-               &pb, NULL, &p, &q);
+      add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0),
+               (m->star[z] & 3) == 2 ? -number : number, &pb, NULL, &p, &q);
     }
   }
 }
@@ -390,8 +400,8 @@ static void add_cone_dd(work *w, rm_lid j, double sign, const plane *pl, const p
   }
 }
 
-static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
-                   const point *q)
+static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                   const point *p, const point *q)
 {
   (void)i, (void)kind;
   for (int h = 0; h < 2; h++) {
@@ -611,7 +621,8 @@ static remap_status keep(rm_arena *arena, const work *w, const rm_moments **out)
   return REMAP_OK;
 }
 
-remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int degree, const rm_moments **out)
+remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int degree,
+                              const rm_moments **out)
 {
   work         w = {.part = part, .o = overlay, .scratch = rm_arena_new(), .num_sums = degree == 2 ? 10 : 4};
   remap_status status = w.scratch ? REMAP_OK : REMAP_NO_MEMORY;

@@ -11,9 +11,9 @@ enum {
   RM_PAIR_EMPTY       = 4  /* no pair: no volume, but the skin of a flat part of one cell passes through the other; V is 0  */
 };
 
-/* Pairs of this rank's pieces that are made here (rm_part_makes_pair). Read-only once built. Invariants: a pair is listed once, in
- * the order of sources and in no particular order within a source; it is listed if its exact volume is not zero, or as RM_PAIR_EMPTY;
- * coordinates are in the mesh room's frame. */
+/* Pairs of this rank's pieces that are made here (rm_part_makes_pair). Read-only once built. Invariants: a pair is listed once,
+ * in the order of sources and in no particular order within a source; it is listed if its exact volume is not zero, or as
+ * RM_PAIR_EMPTY; coordinates are in the mesh room's frame. */
 typedef struct rm_moments {
   int64_t        num_pairs;
   const rm_lid  *source, *target; /* [num_pairs] cells of part->piece[0] and [1]                                       */

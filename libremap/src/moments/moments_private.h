@@ -156,11 +156,11 @@ typedef struct work {
   int64_t           num_pairs, room[7];
 } work;
 
-/* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2 (or in
- * one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. If `other` is not
- * NULL the side is one of a polygon there as well, and that cone counts the other way. */
-typedef void sink(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other, const point *p,
-                  const point *q);
+/* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2
+ * (or in one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. If
+ * `other` is not NULL the side is one of a polygon there as well, and that cone counts the other way. */
+typedef void sink(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
+                  const point *p, const point *q);
 
 /* A point relative to an origin. */
 INLINE void relative(const point *p, const double o[3], double out[3])

@@ -1,5 +1,5 @@
-/* zone_overlap -- see zone_overlap.h. If two zones share volume, the skin of one passes through cells of the other: the cells whose
- * boxes meet a foreign zone's skin, and the cells behind that skin, are all that needs to be overlaid. */
+/* zone_overlap -- see zone_overlap.h. If two zones share volume, the skin of one passes through cells of the other: the cells
+ * whose boxes meet a foreign zone's skin, and the cells behind that skin, are all that needs to be overlaid. */
 #include "moments/zone_overlap.h"
 
 #include <math.h>

@@ -56,8 +56,8 @@ static remap_status file_ends(rm_arena *arena, rm_overlay *o, uint64_t **out)
   return REMAP_OK;
 }
 
-/* Sort the ends of every triangle, by the other triangle and starts first, and make of their words what they are: in place. False if
- * one segment has not exactly one start and one end, *bad is then its triangle. */
+/* Sort the ends of every triangle, by the other triangle and starts first, and make of their words what they are: in place.
+ * False if one segment has not exactly one start and one end, *bad is then its triangle. */
 static bool pair_ends(const rm_overlay *o, uint64_t *word, rm_lid *bad)
 {
   for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++) {
@@ -96,8 +96,9 @@ static remap_status overlay(rm_arena *arena, rm_overlay *o, const rm_part *part,
     const remap_status status =
         rm_trace_build(arena, m, o->mesh[1 - side], side == 0 ? 1 : -1, by_tree, progress, &o->trace[side], &bad);
     if (status == REMAP_INCONSISTENT)
-      return rm_fail(status, reason, side, cell_beside(m, &part->piece[side], m->star[m->star_offset[bad]] / 4),
-                     "an edge of this cell arrives in another cell of the other mesh than its neighbours do; please report both meshes");
+      return rm_fail(
+          status, reason, side, cell_beside(m, &part->piece[side], m->star[m->star_offset[bad]] / 4),
+          "an edge of this cell arrives in another cell of the other mesh than its neighbours do; please report both meshes");
     RM_TRY(status);
     if (o->trace[side].num_crossings > MAX_CROSSINGS) return REMAP_TOO_LARGE;
   }
@@ -109,10 +110,10 @@ static remap_status overlay(rm_arena *arena, rm_overlay *o, const rm_part *part,
   return REMAP_OK;
 }
 
-/* Walking by adjacency rests on the mesh being embedded where its cells are not flagged. Should a mesh be tangled in a way that the
- * flags miss, a check fails, and everything is taken from the box tree, which rests on nothing. */
-remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
-                              const rm_overlay **out, rm_reason *reason)
+/* Walking by adjacency rests on the mesh being embedded where its cells are not flagged. Should a mesh be tangled in a way that
+ * the flags miss, a check fails, and everything is taken from the box tree, which rests on nothing. */
+remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part,
+                              const rm_progress *progress, const rm_overlay **out, rm_reason *reason)
 {
   rm_overlay  *o;
   remap_status status;
@@ -121,7 +122,8 @@ remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], 
   for (int side = 0; side < 2; side++) o->mesh[side] = mesh[side];
   status = overlay(arena, o, part, false, progress, NULL);
   if (status == REMAP_INCONSISTENT) status = overlay(arena, o, part, true, progress, reason);
-  if (status == REMAP_TOO_LARGE) return rm_fail(status, reason, -1, -1, "a rank has more entities than it can count; use more ranks");
+  if (status == REMAP_TOO_LARGE)
+    return rm_fail(status, reason, -1, -1, "a rank has more entities than it can count; use more ranks");
   if (status == REMAP_OK) *out = o;
   return status;
 }

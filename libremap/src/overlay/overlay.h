@@ -122,7 +122,7 @@ typedef struct rm_progress {
 
 /* Trace both ways and pair the segments. Not collective. Lives in arena. O(n + crossings), expected. reason names a cell by the
  * global ids in piece. CANCELLED if progress (may be NULL) says so. */
-remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part, const rm_progress *progress,
-                              const rm_overlay **out, rm_reason *reason);
+remap_status rm_overlay_build(rm_arena *arena, const rm_trimesh *const mesh[2], const rm_part *part,
+                              const rm_progress *progress, const rm_overlay **out, rm_reason *reason);
 
 #endif

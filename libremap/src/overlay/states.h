@@ -1,5 +1,5 @@
-/* states -- interned lists of winding numbers (DESIGN 2.7): the state of a point is the cells it lies in and how often each winds
- * about it. Normally one cell, once, and then the state is that cell's number; equal states are equal integers. */
+/* states -- interned lists of winding numbers (DESIGN 2.7): the state of a point is the cells it lies in and how often each
+ * winds about it. Normally one cell, once, and then the state is that cell's number; equal states are equal integers. */
 #ifndef RM_STATES_H
 #define RM_STATES_H
 

@@ -1,13 +1,14 @@
 /* trace -- edge tracing with label colouring (DESIGN 2.3).
  *
- * Vertices are taken in their order, which is that of space, and every edge carries the state of its first vertex to its second.
- * A vertex that no edge has reached before gets its state from the vertex before it, by a walk along the straight line between
- * them, the first one from a point outside. So crossings are found in the order of their edges.
+ * Vertices are taken in their order, which is that of space, and every edge carries the state of its first vertex to its
+ * second. A vertex that no edge has reached before gets its state from the vertex before it, by a walk along the straight line
+ * between them, the first one from a point outside. So crossings are found in the order of their edges.
  *
- * In a cell, the edge's line is looked along: the cell's vertices are taken in a frame sheared so that the edge runs along an axis,
- * and a triangle is crossed if the line, now a point, lies in it. Most triangles lie to one side as a whole, which bits per vertex
- * tell; for the others it takes three determinants of 2x2, with one error bound for the cell. What the bound cannot decide goes to
- * the exact predicate. Cost: O(triangles of the cell) per crossing by adjacency, O(log n + hits) per edge by the box tree. */
+ * In a cell, the edge's line is looked along: the cell's vertices are taken in a frame sheared so that the edge runs along an
+ * axis, and a triangle is crossed if the line, now a point, lies in it. Most triangles lie to one side as a whole, which bits
+ * per vertex tell; for the others it takes three determinants of 2x2, with one error bound for the cell. What the bound cannot
+ * decide goes to the exact predicate. Cost: O(triangles of the cell) per crossing by adjacency, O(log n + hits) per edge by the
+ * box tree. */
 #include "overlay/trace.h"
 
 #include <math.h>
@@ -27,14 +28,14 @@ enum {
 };
 
 /* Error of an edge's side against a line in the sheared frame, by the square of the reach of its coordinates. With u = 2^-53:
- * differences err by u, shears by 3 u, so sheared coordinates, at most 2 reach, by 8 u reach; their products and the difference of
- * these by less than 80 u reach^2. */
+ * differences err by u, shears by 3 u, so sheared coordinates, at most 2 reach, by 8 u reach; their products and the difference
+ * of these by less than 80 u reach^2. */
 #define LINE_NOISE 0x1p-46
 /* Of a sheared coordinate, by the reach. */
 #define POINT_NOISE 0x1p-49
-/* Of the sum, over a triangle's corners, of such a side by the corner's height over the edge's end, by the square of the reach and the
- * largest height: three products, each off by 80 u reach^2 times the height and 8 reach^2 times 4 u of it, and their sum by as much
- * again. */
+/* Of the sum, over a triangle's corners, of such a side by the corner's height over the edge's end, by the square of the reach
+ * and the largest height: three products, each off by 80 u reach^2 times the height and 8 reach^2 times 4 u of it, and their
+ * sum by as much again. */
 #define HEIGHT_NOISE 0x1p-43
 
 typedef struct tracer {
@@ -459,8 +460,8 @@ static ahead enter_mesh(tracer *t, hit last, hit *next)
 /* What a way of finding the crossings came to. */
 typedef enum walked { WALKED, WALK_TOGETHER, WALK_NOT } walked;
 
-/* Follow the present edge from cell *at, entered through `last` or started in, until it ends or comes out of the mesh; *at becomes
- * where it is then. Cells may ask for no more than `most`, an RM_WALK_. */
+/* Follow the present edge from cell *at, entered through `last` or started in, until it ends or comes out of the mesh; *at
+ * becomes where it is then. Cells may ask for no more than `most`, an RM_WALK_. */
 static remap_status follow(tracer *t, rm_lid *at, hit *last, int most, walked *how)
 {
   hit next = {-1, 0};
@@ -484,8 +485,8 @@ static remap_status follow(tracer *t, rm_lid *at, hit *last, int most, walked *h
   return REMAP_OK;
 }
 
-/* Walk the present edge from its start, in state *state, to its end, in one cell or outside all the way. hits receive the crossings;
- * *state becomes the state at the end, but is unchanged unless *how is WALKED. */
+/* Walk the present edge from its start, in state *state, to its end, in one cell or outside all the way. hits receive the
+ * crossings; *state becomes the state at the end, but is unchanged unless *how is WALKED. */
 static remap_status walk_alone(tracer *t, rm_lid *state, walked *how)
 {
   rm_lid at   = *state;
@@ -512,9 +513,9 @@ static remap_status walk_alone(tracer *t, rm_lid *state, walked *how)
   return REMAP_OK;
 }
 
-/* Where skins overlap or nearly so, the edge may be in several cells at once. Each of them is followed by itself, from the start or
- * from the skin where it comes in, to the end or to the skin where it goes out: star-shaped cells joined by their faces know of no
- * others. hits receive all crossings. */
+/* Where skins overlap or nearly so, the edge may be in several cells at once. Each of them is followed by itself, from the
+ * start or from the skin where it comes in, to the end or to the skin where it goes out: star-shaped cells joined by their
+ * faces know of no others. hits receive all crossings. */
 static remap_status walk_together(tracer *t, rm_lid state, walked *how)
 {
   const rm_lid     *side;
@@ -650,7 +651,8 @@ static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_e
     rm_lid       state;
 
     if (e % STEP == STEP - 1 && progress && progress->call &&
-        progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges", (double)e / m->num_edges))
+        progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges",
+                       (double)e / m->num_edges))
       return REMAP_CANCELLED;
     if (far[v] & far[w]) {
       t->first[e] = t->num_crossings;

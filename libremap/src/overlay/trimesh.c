@@ -1,7 +1,7 @@
 /* trimesh -- triangulates a piece of a mesh and puts it in canonical order (DESIGN 2.1, 2.5).
  *
- * Points are sorted by Morton key, triangles and edges are bucketed by their lowest vertex: O(n) time. About 480 bytes per
- * hexahedron with `diagonal`, 900 with `centre`. */
+ * Points are sorted by Morton key, triangles and edges are bucketed by their lowest vertex: O(n) time. About 800 bytes per
+ * hexahedron with `diagonal`, 1600 with `centre`. */
 #include "overlay/overlay.h"
 
 #include <math.h>
@@ -181,7 +181,8 @@ static remap_status sort_triples(rm_arena *scratch, corner_triple *triple, int64
 }
 
 /* Every triangle once per cell beside it, bucketed by its lowest vertex and sorted within the bucket. */
-static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, rm_lid num_vertices, corner_triple **out, int64_t *num)
+static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, rm_lid num_vertices, corner_triple **out,
+                                    int64_t *num)
 {
   const rm_piece *p = b->piece;
   int64_t        *offset, n = 0;
@@ -200,7 +201,8 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   RM_NEW(triple, b->scratch, n);
   for (int64_t k = 0; k < b->num_raw; k++) {
     const rm_lid  face = b->raw_face[k];
-    corner_triple t    = {{vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, face, 0, p->face_is_skin[face]};
+    corner_triple t    = {
+           {vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, face, 0, p->face_is_skin[face]};
     int           odd  = 0;
 
     if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
@@ -275,9 +277,10 @@ static void triangle_normal(const rm_trimesh *m, rm_lid t, double n[3])
 
 /* ---- edges ------------------------------------------------------------------------------------------------------- */
 
-/* The half edges of all triangles as words: upper vertex, then 4 * triangle + h. Those of a lower vertex stand from offset[vertex] on
- * and ascend, so that the triangles of an edge do too. num_edges: how many edges they make. */
-static remap_status sort_half_edges(rm_arena *scratch, const rm_trimesh *m, rm_lid **out_offset, uint64_t **out, rm_lid *num_edges)
+/* The half edges of all triangles as words: upper vertex, then 4 * triangle + h. Those of a lower vertex stand from
+ * offset[vertex] on and ascend, so that the triangles of an edge do too. num_edges: how many edges they make. */
+static remap_status sort_half_edges(rm_arena *scratch, const rm_trimesh *m, rm_lid **out_offset, uint64_t **out,
+                                    rm_lid *num_edges)
 {
   static const int low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
   const rm_lid nt = m->num_triangles, nv = m->num_vertices;
@@ -290,7 +293,8 @@ static remap_status sort_half_edges(rm_arena *scratch, const rm_trimesh *m, rm_l
     for (int h = 0; h < 3; h++) offset[m->triangle[t][low[h]] + 2]++;
   for (rm_lid v = 0; v < nv; v++) offset[v + 2] += offset[v + 1];
   for (rm_lid t = 0; t < nt; t++)
-    for (int h = 0; h < 3; h++) half[offset[m->triangle[t][low[h]] + 1]++] = (uint64_t)m->triangle[t][high[h]] << 32 | (uint64_t)(4 * t + h);
+    for (int h = 0; h < 3; h++)
+      half[offset[m->triangle[t][low[h]] + 1]++] = (uint64_t)m->triangle[t][high[h]] << 32 | (uint64_t)(4 * t + h);
   for (rm_lid v = 0; v < nv; v++) {
     rm_sort_words(half + offset[v], offset[v + 1] - offset[v]);
     for (rm_lid i = offset[v]; i < offset[v + 1]; i++) ne += i == offset[v] || half[i] >> 32 != half[i - 1] >> 32;
@@ -473,7 +477,9 @@ static rm_lid skin_round(const rm_trimesh *m, rm_lid v, rm_lid t)
 
   do {
     int h = 0;
-    while (m->triangle_edge[at][h] == edge || (m->edge[m->triangle_edge[at][h]][0] != v && m->edge[m->triangle_edge[at][h]][1] != v)) h++;
+    while (m->triangle_edge[at][h] == edge ||
+           (m->edge[m->triangle_edge[at][h]][0] != v && m->edge[m->triangle_edge[at][h]][1] != v))
+      h++;
     edge = m->triangle_edge[at][h];
     rm_lid k = m->star_offset[edge];
     while (m->star[k] / 4 == at || !is_skin(m, m->star[k] / 4)) k++;
@@ -483,8 +489,8 @@ static rm_lid skin_round(const rm_trimesh *m, rm_lid v, rm_lid t)
   return num;
 }
 
-/* Mark every vertex about which the skin closes more than once, or an edge of which has not two skin triangles: there, cells that
- * share a vertex need not be neighbours. O(triangles at edges of the skin). */
+/* Mark every vertex about which the skin closes more than once, or an edge of which has not two skin triangles: there, cells
+ * that share a vertex need not be neighbours. O(triangles at edges of the skin). */
 static remap_status pinched_vertices(rm_arena *scratch, const rm_trimesh *m, uint8_t *pinched)
 {
   rm_lid *num, *one; /* skin triangles at a vertex, and one of them */
@@ -523,8 +529,8 @@ static double height(const rm_trimesh *m, rm_lid t, const double p[3])
   return n[0] * (p[0] - v[0]) + n[1] * (p[1] - v[1]) + n[2] * (p[2] - v[2]);
 }
 
-/* True if a plane clearly parts the cell from the triangle: the triangle's own, or that of a triangle of the cell. Layers of thin
- * cells along a slanted wall are told from it this way, where their boxes cannot. */
+/* True if a plane clearly parts the cell from the triangle: the triangle's own, or that of a triangle of the cell. Layers of
+ * thin cells along a slanted wall are told from it this way, where their boxes cannot. */
 static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
 {
   const double *a = m->cell_box[c], *b = m->vertex[m->triangle[skin][0]];
@@ -534,7 +540,8 @@ static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
 
   for (int k = 0; k < 3; k++) {
     reach = rm_max(reach, rm_max(fabs(a[k + 3] - b[k]), fabs(a[k] - b[k])));
-    reach = rm_max(reach, rm_max(fabs(m->vertex[m->triangle[skin][1]][k] - b[k]), fabs(m->vertex[m->triangle[skin][2]][k] - b[k])));
+    reach =
+        rm_max(reach, rm_max(fabs(m->vertex[m->triangle[skin][1]][k] - b[k]), fabs(m->vertex[m->triangle[skin][2]][k] - b[k])));
   }
   const double noise = 0x1p-46 * reach * reach * reach;
   for (rm_lid k = first; k < last; k++) {
@@ -555,9 +562,9 @@ static bool are_parted(const rm_trimesh *m, rm_lid c, rm_lid skin)
   return false;
 }
 
-/* The skin triangle belongs to a cell that shares no vertex with this one, and may enter it. (Cells that share a vertex which is
- * not pinched are neighbours in the mesh.) Where very many triangles are near, as where thousands of cells meet, that is taken for
- * granted. */
+/* The skin triangle belongs to a cell that shares no vertex with this one, and may enter it. (Cells that share a vertex which
+ * is not pinched are neighbours in the mesh.) Where very many triangles are near, as where thousands of cells meet, that is
+ * taken for granted. */
 static int is_foreign_skin(void *user, rm_lid s)
 {
   nearness         *near  = user;
@@ -613,7 +620,8 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
     for (rm_lid k = m->cell_vertex_offset[c]; k < m->cell_vertex_offset[c + 1]; k++)
       if (pinched[m->cell_vertex[k]]) walk[c] = RM_WALK_TOGETHER;
     if (is_large) walk[c] = RM_WALK_NOT;
-    if (!walk[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near)) walk[c] = RM_WALK_TOGETHER;
+    if (!walk[c] && rm_boxtree_query(m->skin_tree, m->skin_box, m->cell_box[c], is_foreign_skin, &near))
+      walk[c] = RM_WALK_TOGETHER;
     if (is_large ? m->num_cells > 1 : !is_star_shaped(m, c)) {
       walk[c] = RM_WALK_NOT;
       memcpy(odd_box[num_odd++], m->cell_box[c], sizeof *odd_box);

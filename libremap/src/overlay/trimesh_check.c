@@ -1,5 +1,5 @@
-/* trimesh_check -- tests every invariant of a triangulated piece. Each list is compared with what the triangles themselves say: a
- * list of the right length whose entries are right and ascend is complete. O(n), O(cells' edges squared) for the cells' own
+/* trimesh_check -- tests every invariant of a triangulated piece. Each list is compared with what the triangles themselves say:
+ * a list of the right length whose entries are right and ascend is complete. O(n), O(cells' edges squared) for the cells' own
  * numbering, O(n log n) for the tree. */
 #include "overlay/overlay.h"
 
