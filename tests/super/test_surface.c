@@ -3,44 +3,9 @@
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
+#include "surfaces.h"
 
 enum { UNION = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET };
-
-/* An octahedron of the given radius about a centre, its faces divided into n^2 triangles. Volume 4/3 r^3. */
-static tm_mesh *octahedron(int n, double radius, const double centre[3])
-{
-  const int64_t side = 2 * n + 1;
-  tm_builder_   b    = {.num_cells = 1};
-  int64_t      *id;
-  tm_mesh      *mesh;
-
-  for (int octant = 0; octant < 8; octant++) {
-    const int sx = octant & 1 ? -1 : 1, sy = octant & 2 ? -1 : 1, sz = octant & 4 ? -1 : 1;
-
-    for (int i = 0; i < n; i++)
-      for (int j = 0; i + j < n; j++)
-        for (int up = 0; up < 2 && i + j + up < n; up++) { /* corners (i, j, n - i - j), in units of 1 / n */
-          const int p[3][2] = {{i + up, j + up}, {i + 1, j}, {i, j + 1}};
-          int64_t   v[3];
-
-          for (int h = 0; h < 3; h++)
-            v[h] = ((int64_t)(n + sz * (n - p[h][0] - p[h][1])) * side + (n + sy * p[h][1])) * side + (n + sx * p[h][0]);
-          if ((sx * sy * sz < 0) != (up == 1)) {
-            const int64_t x = v[1];
-            v[1]            = v[2];
-            v[2]            = x;
-          }
-          tm_face_(&b, 0, 3, v);
-        }
-  }
-  mesh = tm_finish_(&b, side * side * side, &id);
-  for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
-    const double p[3] = {(double)(id[v] % side - n), (double)(id[v] / side % side - n), (double)(id[v] / side / side - n)};
-    for (int c = 0; c < 3; c++) mesh->xyz[3 * v + c] = centre[c] + radius / n * p[c];
-  }
-  free(id);
-  return mesh;
-}
 
 typedef struct result {
   remap_context       *ctx;
@@ -152,7 +117,7 @@ static void every_position_adds_up(void)
       amount       x[4];
 
       for (int h = 0; h < 4; h++)
-        x[h] = amount_of(octahedron(n, 12, o), octahedron(3, r, p), h < 3 ? 1 << h : UNION);
+        x[h] = amount_of(surfaces_octahedron(n, 12, o), surfaces_octahedron(3, r, p), h < 3 ? 1 << h : UNION);
       RT_NEAR(x[0].volume + x[1].volume, a, most);
       RT_NEAR(x[0].volume + x[2].volume, b, most);
       RT_NEAR(x[3].volume, a + b - x[0].volume, most);
@@ -165,7 +130,7 @@ static void identical_surfaces_are_one(void)
   const double o[3] = {0, 0, 0};
 
   for (int n = 1; n <= 6; n++) {
-    result r = combine(MPI_COMM_SELF, octahedron(n, 4, o), octahedron(n, 4, o), UNION);
+    result r = combine(MPI_COMM_SELF, surfaces_octahedron(n, 4, o), surfaces_octahedron(n, 4, o), UNION);
 
     RT_EQ(r.status, REMAP_OK);
     RT_EQ(r.v.num_cells, 1);
@@ -173,8 +138,8 @@ static void identical_surfaces_are_one(void)
     RT_EQ(r.v.num_nodes, 4 * n * n + 2);
     RT_NEAR(r.v.cell_volume[0], 4. / 3 * 64, 1e-12);
     drop(&r);
-    RT_EQ(amount_of(octahedron(n, 4, o), octahedron(n, 4, o), REMAP_IN_SOURCE).cells, 0);
-    RT_EQ(amount_of(octahedron(n, 4, o), octahedron(n, 4, o), REMAP_IN_TARGET).cells, 0);
+    RT_EQ(amount_of(surfaces_octahedron(n, 4, o), surfaces_octahedron(n, 4, o), REMAP_IN_SOURCE).cells, 0);
+    RT_EQ(amount_of(surfaces_octahedron(n, 4, o), surfaces_octahedron(n, 4, o), REMAP_IN_TARGET).cells, 0);
   }
 }
 
@@ -183,9 +148,9 @@ static void surfaces_of_one_shape_leave_no_difference(void)
 {
   const double o[3] = {1, 2, 3};
 
-  RT_EQ(amount_of(octahedron(3, 12, o), octahedron(4, 12, o), REMAP_IN_SOURCE).cells, 0);
-  RT_EQ(amount_of(octahedron(3, 12, o), octahedron(4, 12, o), REMAP_IN_TARGET).cells, 0);
-  RT_EQ(amount_of(octahedron(3, 12, o), octahedron(4, 12, o), REMAP_IN_BOTH).cells, 1);
+  RT_EQ(amount_of(surfaces_octahedron(3, 12, o), surfaces_octahedron(4, 12, o), REMAP_IN_SOURCE).cells, 0);
+  RT_EQ(amount_of(surfaces_octahedron(3, 12, o), surfaces_octahedron(4, 12, o), REMAP_IN_TARGET).cells, 0);
+  RT_EQ(amount_of(surfaces_octahedron(3, 12, o), surfaces_octahedron(4, 12, o), REMAP_IN_BOTH).cells, 1);
 }
 
 static void surfaces_that_only_touch_share_no_volume(void)
@@ -194,8 +159,8 @@ static void surfaces_that_only_touch_share_no_volume(void)
   const double        o[3] = {0, 0, 0};
 
   for (int k = 0; k < 5; k++) {
-    RT_EQ(amount_of(octahedron(2, 4, o), octahedron(4, 4, touching[k]), REMAP_IN_BOTH).cells, 0);
-    RT_EQ(amount_of(octahedron(2, 4, o), octahedron(4, 4, touching[k]), UNION).cells, 2);
+    RT_EQ(amount_of(surfaces_octahedron(2, 4, o), surfaces_octahedron(4, 4, touching[k]), REMAP_IN_BOTH).cells, 0);
+    RT_EQ(amount_of(surfaces_octahedron(2, 4, o), surfaces_octahedron(4, 4, touching[k]), UNION).cells, 2);
   }
 }
 
@@ -212,7 +177,7 @@ static void a_body_is_cut_from_a_grid(void)
 {
   for (int warped = 0; warped < 2; warped++) {
     const double o[3] = {warped ? .1 : 0, 0, 0};
-    tm_mesh     *body = octahedron(4, 4, o);
+    tm_mesh     *body = surfaces_octahedron(4, 4, o);
     result       r    = combine(MPI_COMM_WORLD, tm_hexahedra((int[]){12, 12, 12}, place, NULL), body, REMAP_IN_SOURCE);
     double       sum[3] = {0, 0, 0}, all[3], a[3];
 
@@ -249,14 +214,14 @@ static void a_body_is_cut_from_a_grid(void)
 static void an_inverted_surface_is_refused(void)
 {
   const double o[3] = {0, 0, 0}, p[3] = {1, 0, 0};
-  tm_mesh     *inverted = octahedron(2, 4, o);
+  tm_mesh     *inverted = surfaces_octahedron(2, 4, o);
 
   for (int64_t f = 0; f < inverted->view.num_faces; f++) {
     const int64_t first = inverted->face_offset[f], x = inverted->face_node[first];
     inverted->face_node[first]     = inverted->face_node[first + 1];
     inverted->face_node[first + 1] = x;
   }
-  result r = combine(MPI_COMM_SELF, inverted, octahedron(2, 4, p), UNION);
+  result r = combine(MPI_COMM_SELF, inverted, surfaces_octahedron(2, 4, p), UNION);
   RT_EQ(r.status, REMAP_BAD_MESH);
   RT_CHECK(remap_message(r.ctx)[0] != 0);
   drop(&r);
@@ -268,7 +233,7 @@ static void what_is_wrong_is_told(void)
   remap_supermesh_options options;
   remap_supermesh_view    v;
   remap_context          *ctx;
-  tm_mesh                *a = octahedron(2, 4, o);
+  tm_mesh                *a = surfaces_octahedron(2, 4, o);
 
   RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &ctx), REMAP_OK);
   remap_supermesh_options_default(&options);

@@ -5,8 +5,8 @@
 
 #include "meshes.h"
 
-/* An octahedron whose faces are divided into n^2 triangles, blown up to a ball about a centre: 8 n^2 triangles. */
-static inline tm_mesh *surfaces_ball(int n, double radius, const double centre[3])
+/* An octahedron of the given radius about a centre, its faces divided into n^2 triangles: 8 n^2, volume 4/3 radius^3. */
+static inline tm_mesh *surfaces_octahedron(int n, double radius, const double centre[3])
 {
   const int64_t side = 2 * n + 1;
   tm_builder_   b    = {.num_cells = 1};
@@ -34,12 +34,24 @@ static inline tm_mesh *surfaces_ball(int n, double radius, const double centre[3
   }
   mesh = tm_finish_(&b, side * side * side, &id);
   for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
-    double       p[3]   = {(double)(id[v] % side - n), (double)(id[v] / side % side - n), (double)(id[v] / side / side - n)};
-    const double length = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-
-    for (int c = 0; c < 3; c++) mesh->xyz[3 * v + c] = centre[c] + radius * p[c] / length;
+    const double p[3] = {(double)(id[v] % side - n), (double)(id[v] / side % side - n), (double)(id[v] / side / side - n)};
+    for (int c = 0; c < 3; c++) mesh->xyz[3 * v + c] = centre[c] + radius / n * p[c];
   }
   free(id);
+  return mesh;
+}
+
+/* The same blown up to a ball. */
+static inline tm_mesh *surfaces_ball(int n, double radius, const double centre[3])
+{
+  tm_mesh *mesh = surfaces_octahedron(n, n, (double[]){0, 0, 0});
+
+  for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
+    double      *p      = mesh->xyz + 3 * v;
+    const double length = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+
+    for (int c = 0; c < 3; c++) p[c] = centre[c] + radius * p[c] / length;
+  }
   return mesh;
 }
 
