@@ -31,7 +31,8 @@ median() { sort -g | awk '{ x[NR] = $1 } END { print x[int((NR + 1) / 2)] }'; }
 map_with() {
   for i in $(seq "$runs"); do
     LC_ALL=C sh -c "mapFieldsPar '$work/source' -case '$work/target' -mapMethod $1 -sourceTime 0 >'$work/log' 2>&1
-      echo \$? >'$work/status'; times" | awk 'END { split($1, u, "[ms]"); split($2, s, "[ms]"); print 60 * u[1] + u[2] + 60 * s[1] + s[2] }'
+      echo \$? >'$work/status'; times" |
+      awk 'END { split($1, u, "[ms]"); split($2, s, "[ms]"); print 60 * u[1] + u[2] + 60 * s[1] + s[2] }'
     if [ "$(cat "$work/status")" != 0 ]; then
       tail -n 20 "$work/log" >&2
       exit 1

@@ -5,7 +5,7 @@
 #   tests/bench/ratio.sh BUILD [PROTOTYPE.c] [RUNS]
 #
 # BUILD is the build folder; PROTOTYPE.c defaults to ../shared/bench/overlay_floor.c beside the project, and rows that need it
-# are left out without it. RUNS defaults to 5. Takes about a minute and 2 GB.
+# are left out without it. RUNS defaults to 5. Takes some minutes and 4 GB.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 build=${1:?usage: ratio.sh BUILD [PROTOTYPE.c] [RUNS]}
