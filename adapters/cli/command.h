@@ -1,5 +1,5 @@
-/* command.h -- what the commands remap and remap-boolean share: a table of options that makes the parser and the help, agreement
- * of ranks, failures of the CGNS adapter in their words. */
+/* command.h -- what the commands remap and remap-boolean share: a table of options that makes the parser and the help,
+ * agreement of ranks, failures of the CGNS adapter in their words. */
 #ifndef REMAP_CLI_COMMAND_H
 #define REMAP_CLI_COMMAND_H
 

@@ -11,8 +11,8 @@
 
 /* ---- the table ---------------------------------------------------------------------------------------------------- */
 
-/* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or CLI_OTHER, what it does. A second
- * line of help follows after \n. */
+/* Options: letter or 0, name, what its argument is called or NULL, where a text or a flag goes or CLI_OTHER, what it does. A
+ * second line of help follows after \n. */
 #define AT(member) offsetof(cli_options, member)
 #define OPTION_LIST(X)                                                                                                       \
   X(FIELDS, 'f', "fields", "LIST", AT(fields), "names or globs, comma separated; default all of SOURCE")                     \

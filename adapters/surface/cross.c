@@ -1,9 +1,8 @@
-/* cross -- do two triangles of a surface meet elsewhere than in their common corners and edges? By exact signs alone. Each
- * triangle asks a tree for those whose boxes meet its own. */
+/* cross -- do two triangles of a surface meet elsewhere than in their common corners and edges? By exact signs alone. A
+ * tree finds the pairs whose boxes meet. */
 #include "surface_private.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_COUNTED = 1000, MOST_NAMED = 2 };
@@ -99,30 +98,37 @@ static void put_triangle(const rsurf_surface *s, const int64_t corner[3], char *
   }
 }
 
+/* What is found. */
+typedef struct crossings {
+  const rsurf_surface *surface;
+  const double        *xyz;
+  const rs_triangles  *triangles;
+  int64_t              num;
+  char                 text[700]; /* the first ones */
+} crossings;
+
+static bool try_pair(void *user, int64_t i, int64_t k)
+{
+  crossings          *found = user;
+  const rs_triangles *t     = found->triangles;
+
+  if (t->face[i] == t->face[k] || !overlap(found->xyz, t->corner[i], t->corner[k])) return true;
+  if (found->num++ < MOST_NAMED) {
+    strcat(found->text, " ");
+    put_triangle(found->surface, t->corner[i], found->text, sizeof found->text - 8);
+    strcat(found->text, " and ");
+    put_triangle(found->surface, t->corner[k], found->text, sizeof found->text - 8);
+  }
+  return found->num < MOST_COUNTED;
+}
+
 rsurf_status rs_check_crossings(const rsurf_surface *surface, const double *xyz, const char *name, const rs_triangles *t,
                                 const rs_tree *tree, rsurf_message *message)
 {
-  rs_array hits      = {.item = NULL};
-  int64_t  num       = 0;
-  char     text[700] = "";
-  bool     ok        = true;
+  crossings found = {.surface = surface, .xyz = xyz, .triangles = t};
 
-  for (int64_t i = 0; i < t->num && ok && num < MOST_COUNTED; i++) {
-    ok = rs_tree_find(tree, tree->box[i], &hits);
-    for (int64_t h = 0; h < hits.count && ok; h++) {
-      const int64_t k = ((const int64_t *)hits.item)[h];
-
-      if (k <= i || t->face[i] == t->face[k] || !overlap(xyz, t->corner[i], t->corner[k])) continue;
-      if (num++ >= MOST_NAMED) continue;
-      strcat(text, " ");
-      put_triangle(surface, t->corner[i], text, sizeof text - 8);
-      strcat(text, " and ");
-      put_triangle(surface, t->corner[k], text, sizeof text - 8);
-    }
-  }
-  free(hits.item);
-  if (!ok) return rs_no_memory(message);
-  if (!num) return RSURF_OK;
+  rs_tree_pairs(tree, try_pair, &found);
+  if (!found.num) return RSURF_OK;
   return rs_fail(message, RSURF_GEOMETRY, "%s: the surface crosses itself: %s%lld pairs of triangles, such as%s: repair it",
-                 name, num >= MOST_COUNTED ? "at least " : "", (long long)num, text);
+                 name, found.num >= MOST_COUNTED ? "at least " : "", (long long)found.num, found.text);
 }

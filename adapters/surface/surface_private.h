@@ -139,6 +139,9 @@ typedef struct rs_tree {
 bool rs_tree_build(int64_t num, const double (*box)[6], rs_tree *out);
 /* Numbers of the boxes that meet a box, in hits, which is overwritten. false: no memory. */
 bool rs_tree_find(const rs_tree *tree, const double box[6], rs_array *hits);
+/* Hear of each pair of boxes that meet, once, until visit returns false. */
+typedef bool (*rs_visit)(void *user, int64_t one, int64_t other);
+void rs_tree_pairs(const rs_tree *tree, rs_visit visit, void *user);
 void rs_tree_drop(rs_tree *tree);
 
 /* Shells into bodies: checks that triangles do not cross, turns faces and notes it in turned [faces]. shell [faces]; xyz

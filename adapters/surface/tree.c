@@ -88,6 +88,34 @@ static bool find(const rs_tree *tree, int64_t lo, int64_t hi, const double box[6
   return !meets(tree->part[mid], box) || (find(tree, lo, mid, box, hits) && find(tree, mid, hi, box, hits));
 }
 
+/* The box around a part of the list. */
+static const double *around(const rs_tree *tree, int64_t lo, int64_t hi)
+{
+  return hi - lo < 2 ? tree->box[tree->item[lo]] : tree->part[lo + (hi - lo) / 2];
+}
+
+/* Pairs of an item of one part and one of another; false: visit has had enough. */
+static bool pairs_between(const rs_tree *tree, const int64_t a[2], const int64_t b[2], rs_visit visit, void *user)
+{
+  const bool     split_a = a[1] - a[0] > b[1] - b[0];
+  const int64_t *larger = split_a ? a : b, *other = split_a ? b : a, mid = larger[0] + (larger[1] - larger[0]) / 2;
+
+  if (!meets(around(tree, a[0], a[1]), around(tree, b[0], b[1]))) return true;
+  if (larger[1] - larger[0] < 2) return visit(user, tree->item[a[0]], tree->item[b[0]]);
+  return pairs_between(tree, (int64_t[2]){larger[0], mid}, other, visit, user) &&
+         pairs_between(tree, (int64_t[2]){mid, larger[1]}, other, visit, user);
+}
+
+static bool pairs_within(const rs_tree *tree, int64_t lo, int64_t hi, rs_visit visit, void *user)
+{
+  const int64_t mid = lo + (hi - lo) / 2;
+
+  return hi - lo < 2 || (pairs_within(tree, lo, mid, visit, user) && pairs_within(tree, mid, hi, visit, user) &&
+                         pairs_between(tree, (int64_t[2]){lo, mid}, (int64_t[2]){mid, hi}, visit, user));
+}
+
+void rs_tree_pairs(const rs_tree *tree, rs_visit visit, void *user) { (void)pairs_within(tree, 0, tree->num, visit, user); }
+
 bool rs_tree_find(const rs_tree *tree, const double box[6], rs_array *hits)
 {
   hits->count = 0;
