@@ -294,7 +294,6 @@ void rcgns_close(rcgns_file **address)
   rc_drop(&file->names);
   rc_drop(&file->bases);
   rc_drop(&file->notes);
-  rc_drop(&file->build.rim);
   rc_drop(&file->boundary_name);
   rc_drop(&file->boundary_type);
   free(file->face_boundary);
