@@ -156,7 +156,7 @@ static void a_jump_of_density_a_thousandfold_leaves_states_that_can_be(void)
   for (int kind = AV_HEXAHEDRA; kind <= AV_DUAL; kind++) {
     gas g;
 
-    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh((av_kind)kind, kind ? 20 : 15, -0.02), 3, shear,
+    if (gas_open(&g, MPI_COMM_WORLD, av_mesh(AV_HEXAHEDRA, 12, 0.02), av_mesh((av_kind)kind, kind ? 16 : 13, -0.02), 3, shear,
                  1000, false))
       for (int order = 1; order <= 3; order++)
         for (int limiter = REMAP_LIMITER_NONE; limiter <= (order > 1 ? REMAP_LIMITER_CAAS : REMAP_LIMITER_NONE); limiter++)
@@ -170,7 +170,7 @@ static void whatever_moves_leaves_states_that_can_be(void)
   for (int kind = AV_HEXAHEDRA; kind < AV_NUM_KINDS; kind++) {
     gas g;
 
-    if (gas_open(&g, MPI_COMM_WORLD, av_mesh((av_kind)kind, kind == AV_MIXED ? 7 : 10, 0.03), av_mesh(AV_TETRAHEDRA, 13, -0.02),
+    if (gas_open(&g, MPI_COMM_WORLD, av_mesh((av_kind)kind, kind == AV_MIXED ? 6 : 8, 0.03), av_mesh(AV_TETRAHEDRA, 10, -0.02),
                  3, wild, 1, false))
       for (int order = 2; order <= 3; order++)
         for (int limiter = REMAP_LIMITER_NONE; limiter <= REMAP_LIMITER_AUTO; limiter++)
