@@ -95,18 +95,15 @@ static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pai
   return REMAP_OK;
 }
 
-/* List every giver once, by rank and number there; giver_of_record [n] receives its place in the list. */
-static remap_status list_givers(rm_arena *arena, rm_arena *scratch, int64_t n, const pair_record *record, rows_draft *draft,
+/* List every giver once, by rank and number there; giver_of_record [n] receives its place in the list. keyed is [2 n]. */
+static remap_status list_givers(rm_arena *arena, rm_keyed *keyed, int64_t n, const pair_record *record, rows_draft *draft,
                                 rm_rows *rows, rm_lid *giver_of_record)
 {
-  rm_keyed *keyed, *spare;
-  int64_t   num = 0;
+  int64_t num = 0;
 
-  RM_NEW(keyed, scratch, n);
-  RM_NEW(spare, scratch, n);
   for (int64_t k = 0; k < n; k++)
     keyed[k] = (rm_keyed){(uint64_t)record[k].giver_rank << 32 | (uint64_t)record[k].giver_cell, k};
-  rm_sort_keyed(keyed, spare, n);
+  rm_sort_keyed(keyed, keyed + n, n);
   for (int64_t k = 0; k < n; k++) {
     num += k == 0 || keyed[k].key != keyed[k - 1].key;
     giver_of_record[keyed[k].item] = (rm_lid)(num - 1);
@@ -127,28 +124,25 @@ static remap_status list_givers(rm_arena *arena, rm_arena *scratch, int64_t n, c
   return REMAP_OK;
 }
 
-/* Records sorted by receiver and, within, by the canonical order of the givers: place [n] lists them so. */
-static remap_status sort_rows(rm_arena *scratch, const rm_frame *frame, int64_t n, const pair_record *record,
+/* Records sorted by receiver and, within, by the canonical order of the givers: place [n] lists them so. keyed is [2 n]. */
+static remap_status sort_rows(rm_arena *scratch, rm_keyed *keyed, const rm_frame *frame, int64_t n, const pair_record *record,
                               const rm_lid *giver_of_record, const rows_draft *draft, const rm_rows *rows, int64_t *place)
 {
   const rm_lid num = rows->num_givers;
   double      *volume; /* of the givers */
   rm_lid      *order, *rank_of_giver;
-  rm_keyed    *keyed, *spare;
   int64_t     *next;
 
   RM_NEW(volume, scratch, num);
   RM_NEW(order, scratch, num);
   RM_NEW(rank_of_giver, scratch, num);
-  RM_NEW(keyed, scratch, n);
-  RM_NEW(spare, scratch, n);
   RM_NEW(next, scratch, rows->num_cells);
   for (int64_t k = 0; k < n; k++) volume[giver_of_record[k]] = record[k].giver_volume;
   RM_TRY(
       rm_canonical_order(scratch, frame, num, (const double(*)[3])draft->giver_centroid, volume, draft->giver_global, order));
   for (rm_lid k = 0; k < num; k++) rank_of_giver[order[k]] = k;
   for (int64_t k = 0; k < n; k++) keyed[k] = (rm_keyed){(uint64_t)rank_of_giver[giver_of_record[k]], k};
-  rm_sort_keyed(keyed, spare, n);
+  rm_sort_keyed(keyed, keyed + n, n);
   for (rm_lid c = 0; c < rows->num_cells; c++) next[c] = draft->offset[c];
   for (int64_t k = 0; k < n; k++) place[next[record[keyed[k].item].receiver]++] = keyed[k].item;
   return REMAP_OK;
@@ -188,9 +182,10 @@ static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_vo
 static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame *frame, const rm_mesh *mesh, int64_t n,
                               pair_record *record, double (*second)[6], rows_draft *draft, rm_rows *rows, rm_reason *reason)
 {
-  rm_lid  *giver_of_record;
-  int64_t *place;
-  uint8_t *is_cut;
+  rm_lid   *giver_of_record;
+  int64_t  *place;
+  uint8_t  *is_cut;
+  rm_keyed *keyed;
 
   if (n > INT32_MAX)
     return rm_fail(REMAP_TOO_LARGE, reason, mesh->side, -1, "%lld pairs come to one rank; use more ranks", (long long)n);
@@ -200,13 +195,14 @@ static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame
   RM_TRY(new_rows(arena, mesh->num_cells, n, second != NULL, draft));
   RM_NEW(giver_of_record, scratch, n);
   RM_NEW(place, scratch, n);
+  RM_NEW(keyed, scratch, 2 * n);
   for (int64_t k = 0; k < n; k++) {
     RM_ASSERT(record[k].receiver >= 0 && record[k].receiver < mesh->num_cells);
     draft->offset[record[k].receiver]++;
   }
   rm_offsets(draft->offset, mesh->num_cells);
-  RM_TRY(list_givers(arena, scratch, n, record, draft, rows, giver_of_record));
-  RM_TRY(sort_rows(scratch, frame, n, record, giver_of_record, draft, rows, place));
+  RM_TRY(list_givers(arena, keyed, n, record, draft, rows, giver_of_record));
+  RM_TRY(sort_rows(scratch, keyed, frame, n, record, giver_of_record, draft, rows, place));
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
     for (int64_t k = draft->offset[c]; k < draft->offset[c + 1]; k++) {
       const pair_record *p = &record[place[k]];
@@ -243,24 +239,27 @@ static remap_status bring_home(rm_arena *arena, const rm_comm *comm, const rm_fr
                                const rm_part *part, const rm_moments *moments, rows_draft *draft, rm_rows *rows,
                                rm_reason *reason)
 {
-  rm_arena    *scratch     = rm_arena_new();
-  int64_t     *send_offset = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *send_offset) : NULL;
+  rm_arena    *scratch = rm_arena_new(), *leaving = rm_arena_new(); /* leaving: what is sent */
+  int64_t     *send_offset = leaving ? rm_arena_alloc(leaving, (int64_t)comm->size + 1, sizeof *send_offset) : NULL;
   int64_t     *recv_offset = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *recv_offset) : NULL;
   pair_record *send        = NULL;
   void        *recv = NULL, *recv_second = NULL;
   double(*send_second)[6]  = NULL;
   remap_status status      = REMAP_NO_MEMORY;
 
-  if (send_offset && recv_offset) status = pack_pairs(scratch, comm, part, moments, mesh->side, send_offset, &send, &send_second);
+  if (send_offset && recv_offset) status = pack_pairs(leaving, comm, part, moments, mesh->side, send_offset, &send, &send_second);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send, send_offset, send, recv_offset, &recv));
   if (moments->second)
     RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send_second, send_offset, send_second, recv_offset, &recv_second));
-  status = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, recv_second, draft, rows, reason);
+  rm_arena_drop(leaving);
+  leaving = NULL;
+  status  = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, recv_second, draft, rows, reason);
   RM_GOTO(done, status = rm_comm_agree_reason(comm, status, reason));
   publish(draft, rows);
   status = rm_plan_build(comm, arena, rows->num_givers, rows->giver_rank, rows->giver_cell, &rows->plan);
 done:
+  rm_arena_drop(leaving);
   rm_arena_drop(scratch);
   return status;
 }
