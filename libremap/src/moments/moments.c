@@ -584,18 +584,20 @@ static remap_status all_cells(work *w)
   return REMAP_OK;
 }
 
-/* data[place[k]] for all k, in the arena. */
-static void *kept(rm_arena *arena, const void *data, const int64_t *place, int64_t n, size_t size)
+/* (*data)[place[k]] for all k, in the arena; *data, malloc'ed, is given back. */
+static void *kept(rm_arena *arena, void *data, const int64_t *place, int64_t n, size_t size)
 {
-  const char *from = data;
-  char       *to   = rm_arena_alloc(arena, n, size);
+  char *from, *to = rm_arena_alloc(arena, n, size);
 
+  memcpy(&from, data, sizeof from); /* data points to a pointer of some type */
   for (int64_t k = 0; to && k < n; k++) memcpy(to + (size_t)k * size, from + (size_t)place[k] * size, size);
+  free(from);
+  memset(data, 0, sizeof from);
   return to;
 }
 
 /* The pairs in the order of their sources. */
-static remap_status keep(rm_arena *arena, const work *w, const rm_moments **out)
+static remap_status keep(rm_arena *arena, work *w, const rm_moments **out)
 {
   const int64_t n = w->num_pairs;
   int64_t      *next, *place;
@@ -608,13 +610,13 @@ static remap_status keep(rm_arena *arena, const work *w, const rm_moments **out)
   for (int64_t k = 0; k < n; k++) place[next[w->source[k]]++] = k;
   RM_NEW0(m, arena, 1);
   m->num_pairs = n;
-  m->source    = kept(arena, w->source, place, n, sizeof *w->source);
-  m->target    = kept(arena, w->target, place, n, sizeof *w->target);
-  m->volume    = kept(arena, w->volume, place, n, sizeof *w->volume);
-  m->moment    = kept(arena, w->moment, place, n, sizeof *w->moment);
-  m->flags     = kept(arena, w->flags, place, n, sizeof *w->flags);
-  m->second    = w->num_sums == 10 ? kept(arena, w->second, place, n, sizeof *w->second) : NULL;
-  m->second_back = w->num_sums == 10 ? kept(arena, w->second_back, place, n, sizeof *w->second_back) : NULL;
+  m->source    = kept(arena, &w->source, place, n, sizeof *w->source);
+  m->target    = kept(arena, &w->target, place, n, sizeof *w->target);
+  m->volume    = kept(arena, &w->volume, place, n, sizeof *w->volume);
+  m->moment    = kept(arena, &w->moment, place, n, sizeof *w->moment);
+  m->flags     = kept(arena, &w->flags, place, n, sizeof *w->flags);
+  m->second    = w->num_sums == 10 ? kept(arena, &w->second, place, n, sizeof *w->second) : NULL;
+  m->second_back = w->num_sums == 10 ? kept(arena, &w->second_back, place, n, sizeof *w->second_back) : NULL;
   if (!m->source || !m->target || !m->volume || !m->moment || !m->flags) return REMAP_NO_MEMORY;
   if (w->num_sums == 10 && (!m->second || !m->second_back)) return REMAP_NO_MEMORY;
   *out = m;
