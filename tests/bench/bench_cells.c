@@ -28,7 +28,7 @@ static double peak_bytes(void)
   return 1024.0 * (double)use.ru_maxrss;
 }
 
-/* ---- closed surfaces ------------------------------------------------------------------------------------------------------- */
+/* ---- closed surfaces --------------------------------------------------------------------------------------------- */
 
 typedef struct soup {
   tm_mesh *mesh;
@@ -130,8 +130,9 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
              "\"vertices\":%d,\"s_overlay\":%.3f,\"s_cells\":%.3f,\"us_per_maph\":%.2f,\"bytes_result_per_maph\":%.0f,"
              "\"bytes_peak_per_maph\":%.0f}\n",
              name, l->mesh[0]->num_cells, l->mesh[1]->num_cells, l->mesh[0]->num_triangles, l->mesh[1]->num_triangles,
-             cells->num_cells, cells->num_faces, cells->num_vertices, overlay, build, 1e6 * (overlay + build) / cells->num_cells,
-             (double)rm_arena_bytes(arena) / cells->num_cells, (peak_bytes() - before) / cells->num_cells);
+             cells->num_cells, cells->num_faces, cells->num_vertices, overlay, build,
+             1e6 * (overlay + build) / cells->num_cells, (double)rm_arena_bytes(arena) / cells->num_cells,
+             (peak_bytes() - before) / cells->num_cells);
     rm_arena_drop(arena);
     rm_arena_drop(passing);
   }
@@ -168,7 +169,8 @@ static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int kee
          "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f}\n",
          rank, size, (long long)v.global_cells, (long long)v.num_cells, (long long)v.num_faces, (long long)v.num_nodes,
          1e6 * (t1 - t0) / (double)v.num_cells, (peak_bytes() - before) / (double)v.num_cells, v.seconds_partition,
-         v.seconds_triangulation, v.seconds_crossings, v.seconds_polygons, v.seconds_cells, v.seconds_faces, v.seconds_numbering, t1 - t0);
+         v.seconds_triangulation, v.seconds_crossings, v.seconds_polygons, v.seconds_cells, v.seconds_faces,
+         v.seconds_numbering, t1 - t0);
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
 }
@@ -178,7 +180,9 @@ int main(int argc, char **argv)
   if (argc > 3 && !strcmp(argv[1], "all")) {
     const bool spheres = !strcmp(argv[2], "spheres");
     MPI_Init(&argc, &argv);
-    if (spheres) run_all(sphere(atoi(argv[3]), 0), sphere(atoi(argv[3]), argc > 4 ? atof(argv[4]) : .1), REMAP_FACES_DIAGONAL, REMAP_IN_BOTH);
+    if (spheres)
+      run_all(sphere(atoi(argv[3]), 0), sphere(atoi(argv[3]), argc > 4 ? atof(argv[4]) : .1), REMAP_FACES_DIAGONAL,
+              REMAP_IN_BOTH);
     else if (argc > 5)
       run_all(tm_benchmark(atoi(argv[2]), argc > 7 ? atof(argv[7]) : 0.7, argc > 6 ? atof(argv[6]) : 0.3, atof(argv[4])),
               tm_benchmark(atoi(argv[3]), 0.1, 0, 1), strcmp(argv[5], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE,
@@ -187,7 +191,8 @@ int main(int argc, char **argv)
     return 0;
   }
   if (argc > 3 && !strcmp(argv[1], "spheres")) {
-    run("spheres", sphere(atoi(argv[2]), 0), sphere(atoi(argv[2]), atof(argv[3])), REMAP_FACES_DIAGONAL, argc > 4 ? atoi(argv[4]) : 1);
+    run("spheres", sphere(atoi(argv[2]), 0), sphere(atoi(argv[2]), atof(argv[3])), REMAP_FACES_DIAGONAL,
+        argc > 4 ? atoi(argv[4]) : 1);
   } else if (argc > 2 && !strcmp(argv[1], "cut")) {
     run("cut", tm_hexahedra((int[]){32, 40, 23}, box_of_grid, NULL), sphere(atoi(argv[2]), 0), REMAP_FACES_DIAGONAL,
         argc > 3 ? atoi(argv[3]) : 1);
@@ -196,8 +201,10 @@ int main(int argc, char **argv)
         tm_benchmark(atoi(argv[2]), 0.1, 0, 1), strcmp(argv[4], "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE,
         argc > 5 ? atoi(argv[5]) : 1);
   } else {
-    return fprintf(stderr, "usage: bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]] | spheres LEVEL OFFSET [REPEATS] "
-                           "| cut LEVEL [REPEATS]\n"), 2;
+    return fprintf(stderr,
+                   "usage: bench_cells N NB SCALE diagonal|centre [REPEATS [ANGLE [PHASE]]] | spheres LEVEL OFFSET [REPEATS] "
+                   "| cut LEVEL [REPEATS]\n"),
+           2;
   }
   return 0;
 }

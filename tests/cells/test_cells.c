@@ -1,11 +1,13 @@
-/* The supermesh of small meshes: closed cells, volumes against the moments, faces against the faces they came from, conformity. */
+/* The supermesh of small meshes: closed cells, volumes against the moments, faces against the faces they came from,
+ * conformity. */
 #include "super.h"
 
 /* Both triangulations, both ways round; the meshes are given up. */
 static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
 {
   for (int way = 0; way < 4; way++) {
-    super s = super_of(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL, SUPER_UNION);
+    super s =
+        super_of(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
     super_check(&s, odd_cells, odd_cells >= 0);
     laid_free(s.l);
@@ -14,7 +16,7 @@ static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
   tm_free(b);
 }
 
-/* ---- boxes ----------------------------------------------------------------------------------------------------------------- */
+/* ---- boxes ------------------------------------------------------------------------------------------------------- */
 
 typedef struct spacing {
   int    n;
@@ -58,7 +60,8 @@ static void widen(double xyz[3], const void *data)
   xyz[1] *= 40;
 }
 
-static const spacing one = {1, {0, 120}}, two = {2, {0, 60, 120}}, three = {3, {0, 40, 80, 120}}, four = {4, {0, 30, 60, 90, 120}};
+static const spacing one = {1, {0, 120}}, two = {2, {0, 60, 120}}, three = {3, {0, 40, 80, 120}},
+                     four = {4, {0, 30, 60, 90, 120}};
 static const spacing wide = {3, {0, 60, 120, 180}}, one_wide = {1, {0, 180}}, shifted = {2, {30, 90, 150}};
 static const spacing beside = {2, {120, 180, 240}}, corner = {1, {120, 180}}, flat = {3, {0, 60, 60, 120}};
 static const spacing inner = {1, {40, 80}}, inner_two = {2, {40, 50, 80}}, around = {2, {-10, 70, 130}};
@@ -66,22 +69,34 @@ static const spacing inner = {1, {40, 80}}, inner_two = {2, {40, 50, 80}}, aroun
 static void identical_boxes(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&two, &two, &two, NULL), 0); }
 static void identical_warped_boxes(void) { agrees(boxes(&two, &two, &two, warp), boxes(&two, &two, &two, warp), 0); }
 static void children_in_their_parents(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&four, &four, &four, NULL), 0); }
-static void a_box_around_all(void) { agrees(boxes(&wide, &wide, &wide, NULL), boxes(&one_wide, &one_wide, &one_wide, NULL), 0); }
+static void a_box_around_all(void)
+{
+  agrees(boxes(&wide, &wide, &wide, NULL), boxes(&one_wide, &one_wide, &one_wide, NULL), 0);
+}
 static void two_against_three(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&three, &three, &three, NULL), 0); }
 static void boxes_shifted_by_half(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&shifted, &shifted, &shifted, NULL), 0); }
 static void boxes_that_abut(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&beside, &two, &two, NULL), 0); }
 static void boxes_that_abut_askew(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&beside, &shifted, &three, NULL), 0); }
-static void boxes_that_touch_in_a_vertex(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&corner, &corner, &corner, NULL), 0); }
+static void boxes_that_touch_in_a_vertex(void)
+{
+  agrees(boxes(&two, &two, &two, NULL), boxes(&corner, &corner, &corner, NULL), 0);
+}
 static void warped_boxes_on_straight_ones(void) { agrees(boxes(&two, &two, &two, warp), boxes(&two, &two, &two, NULL), -1); }
 static void a_singular_axis(void) { agrees(boxes(&two, &two, &two, to_axis), boxes(&two, &two, &two, widen), -1); }
 static void a_layer_without_thickness(void) { agrees(boxes(&flat, &two, &two, NULL), boxes(&two, &two, &two, NULL), 0); }
 static void two_layers_without_thickness(void) { agrees(boxes(&flat, &flat, &two, NULL), boxes(&flat, &flat, &two, NULL), 0); }
 static void a_box_within_a_box(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &inner, NULL), 1); }
 static void a_box_through_a_face(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner, &inner, &around, NULL), 1); }
-static void a_box_on_a_face_from_inside(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &two, NULL), 1); }
-static void a_box_on_a_face_from_outside(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &beside, NULL), 0); }
+static void a_box_on_a_face_from_inside(void)
+{
+  agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &two, NULL), 1);
+}
+static void a_box_on_a_face_from_outside(void)
+{
+  agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &beside, NULL), 0);
+}
 
-/* ---- meshes in general position ------------------------------------------------------------------------------------------------ */
+/* ---- meshes in general position ---------------------------------------------------------------------------------- */
 
 static void benchmark_meshes(void) { agrees(tm_benchmark(3, 0.7, 0.3, 0.4), tm_benchmark(4, 0.1, 0, 1), -1); }
 static void moved_tetrahedra_on_prisms(void)
@@ -124,7 +139,7 @@ static void volumes_hold_far_from_the_origin(void)
   }
 }
 
-/* ---- booleans ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- booleans ---------------------------------------------------------------------------------------------------- */
 
 static const int every_keep[] = {REMAP_IN_BOTH, REMAP_IN_SOURCE, REMAP_IN_TARGET, SUPER_WHOLE_SOURCE, SUPER_UNION};
 
@@ -313,19 +328,21 @@ static void to_edge(double xyz[3], const void *data)
 static void faces_without_area_are_left_out(void)
 {
   agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL), tm_hexahedra((int[]){4, 4, 4}, NULL, NULL), 0);
-  agrees(tm_refined((int[]){2, 2, 2}, tm_right_half, squash, NULL), tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL), -1);
+  agrees(tm_refined((int[]){2, 2, 2}, tm_right_half, squash, NULL), tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL),
+         -1);
   agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, to_axis, NULL), tm_tetrahedra((int[]){2, 2, 2}, NULL, NULL), -1);
   agrees(tm_refined((int[]){4, 2, 2}, tm_checkered, to_edge, NULL), tm_hexahedra((int[]){3, 2, 3}, NULL, NULL), -1);
 }
 
-/* ---- numbering -------------------------------------------------------------------------------------------------------------------- */
+/* ---- numbering --------------------------------------------------------------------------------------------------- */
 
 static void compare(const super *s, const super *t)
 {
   const rm_cells *a = s->cells, *b = t->cells;
   int64_t         different = 0;
 
-  if (!RT_EQ(b->num_vertices, a->num_vertices) || !RT_EQ(b->num_faces, a->num_faces) || !RT_EQ(b->num_cells, a->num_cells)) return;
+  if (!RT_EQ(b->num_vertices, a->num_vertices) || !RT_EQ(b->num_faces, a->num_faces) || !RT_EQ(b->num_cells, a->num_cells))
+    return;
   RT_CHECK(!memcmp(a->vertex, b->vertex, sizeof *a->vertex * (size_t)a->num_vertices));
   RT_CHECK(!memcmp(a->face_offset, b->face_offset, sizeof *a->face_offset * ((size_t)a->num_faces + 1)));
   RT_CHECK(!memcmp(a->face_vertex, b->face_vertex, sizeof *a->face_vertex * (size_t)a->face_offset[a->num_faces]));
@@ -348,7 +365,8 @@ static void numbering_and_senders_change_no_bit(void)
   for (int k = 0; k < 3; k++) {
     super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, SUPER_UNION);
     for (int senders = 1; senders < 4; senders++) {
-      super t = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, &(laid_how){.shuffle = 5 + (uint64_t)senders, .senders = senders}, SUPER_UNION);
+      super t = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE,
+                         &(laid_how){.shuffle = 5 + (uint64_t)senders, .senders = senders}, SUPER_UNION);
       if (RT_EQ(s.status, REMAP_OK) && RT_EQ(t.status, REMAP_OK)) compare(&s, &t);
       laid_free(t.l);
     }
@@ -411,15 +429,17 @@ static void memory_that_runs_out_is_told(void)
   tm_free(b);
 }
 
-RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents), RT_CASE(a_box_around_all),
-        RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut), RT_CASE(boxes_that_abut_askew),
-        RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones), RT_CASE(a_singular_axis),
-        RT_CASE(a_layer_without_thickness), RT_CASE(two_layers_without_thickness), RT_CASE(a_box_within_a_box),
-        RT_CASE(a_box_through_a_face), RT_CASE(a_box_on_a_face_from_inside), RT_CASE(a_box_on_a_face_from_outside),
-        RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms), RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(volumes_hold_far_from_the_origin), RT_CASE(operations_add_up),
-        RT_CASE(identical_operands_are_their_union_and_leave_no_difference), RT_CASE(operands_with_one_skin_leave_no_difference),
-        RT_CASE(abutting_operands_share_faces_and_no_volume), RT_CASE(nested_operands_are_the_finer_one),
-        RT_CASE(components_of_a_pair_are_cells_of_their_own), RT_CASE(a_cell_may_have_several_voids),
-        RT_CASE(a_void_belongs_to_the_part_around_it), RT_CASE(cells_that_overlap_are_refused), RT_CASE(faces_without_area_are_left_out),
-        RT_CASE(numbering_and_senders_change_no_bit),
-        RT_CASE(which_mesh_is_the_source_moves_no_vertex), RT_CASE(memory_that_runs_out_is_told))
+RT_MAIN(RT_CASE(identical_boxes), RT_CASE(identical_warped_boxes), RT_CASE(children_in_their_parents),
+        RT_CASE(a_box_around_all), RT_CASE(two_against_three), RT_CASE(boxes_shifted_by_half), RT_CASE(boxes_that_abut),
+        RT_CASE(boxes_that_abut_askew), RT_CASE(boxes_that_touch_in_a_vertex), RT_CASE(warped_boxes_on_straight_ones),
+        RT_CASE(a_singular_axis), RT_CASE(a_layer_without_thickness), RT_CASE(two_layers_without_thickness),
+        RT_CASE(a_box_within_a_box), RT_CASE(a_box_through_a_face), RT_CASE(a_box_on_a_face_from_inside),
+        RT_CASE(a_box_on_a_face_from_outside), RT_CASE(benchmark_meshes), RT_CASE(moved_tetrahedra_on_prisms),
+        RT_CASE(dual_on_hexahedra), RT_CASE(refined_on_mixed), RT_CASE(volumes_hold_far_from_the_origin),
+        RT_CASE(operations_add_up), RT_CASE(identical_operands_are_their_union_and_leave_no_difference),
+        RT_CASE(operands_with_one_skin_leave_no_difference), RT_CASE(abutting_operands_share_faces_and_no_volume),
+        RT_CASE(nested_operands_are_the_finer_one), RT_CASE(components_of_a_pair_are_cells_of_their_own),
+        RT_CASE(a_cell_may_have_several_voids), RT_CASE(a_void_belongs_to_the_part_around_it),
+        RT_CASE(cells_that_overlap_are_refused), RT_CASE(faces_without_area_are_left_out),
+        RT_CASE(numbering_and_senders_change_no_bit), RT_CASE(which_mesh_is_the_source_moves_no_vertex),
+        RT_CASE(memory_that_runs_out_is_told))

@@ -14,7 +14,8 @@ static bool is_plain(const rm_trimesh *m)
       for (int d = 0; d < 3; d++) o[d] += m->vertex[m->cell_vertex[k]][d] / (last - first);
     for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1]; a++) {
       const rm_lid *t = m->triangle[m->cell_triangle[a] / 2];
-      if (rm_det_dd(o, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]).hi * (m->cell_triangle[a] & 1 ? -1 : 1) < 1e-9) return false;
+      if (rm_det_dd(o, m->vertex[t[0]], m->vertex[t[1]], m->vertex[t[2]]).hi * (m->cell_triangle[a] & 1 ? -1 : 1) < 1e-9)
+        return false;
     }
   }
   return true;
@@ -30,7 +31,8 @@ static bool try_seed(uint64_t number, bool rough)
   const bool        plain = s.l->mesh[0] && s.l->mesh[1] && is_plain(s.l->mesh[0]) && is_plain(s.l->mesh[1]);
 
   if (plain) super_check(&s, -1, faces == REMAP_FACES_DIAGONAL); /* centres do not have few bits */
-  if (rt_failed_ > before) printf("# seed %llu, %d and %d cells, faces %d\n", (unsigned long long)number, s.l->num[0], s.l->num[1], faces);
+  if (rt_failed_ > before)
+    printf("# seed %llu, %d and %d cells, faces %d\n", (unsigned long long)number, s.l->num[0], s.l->num[1], faces);
   laid_free(s.l);
   tm_free(a);
   tm_free(b);
@@ -41,7 +43,8 @@ static void seeds(int count, bool rough)
 {
   int done = 0;
 
-  for (uint64_t number = 1; done < (rt_long() ? 50 * count : count) && rt_failed_ < 40; number++) done += try_seed(number, rough);
+  for (uint64_t number = 1; done < (rt_long() ? 50 * count : count) && rt_failed_ < 40; number++)
+    done += try_seed(number, rough);
 }
 
 static void straight_meshes_on_one_lattice_have_a_supermesh(void) { seeds(400, false); }

@@ -1,5 +1,5 @@
-/* The supermesh over all ranks: the bits of one rank, whatever the partition and numbering; conformal; volumes that add up; cells that
- * meet nothing passed through; values of cells and faces taken over. */
+/* The supermesh over all ranks: the bits of one rank, whatever the partition and numbering; conformal; volumes that add up;
+ * cells that meet nothing passed through; values of cells and faces taken over. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rough.h"
@@ -55,7 +55,7 @@ static void close_world(world *w)
   for (int side = 0; side < 2; side++) tm_free(w->mine[side]);
 }
 
-/* ---- one rank ------------------------------------------------------------------------------------------------------------------ */
+/* ---- one rank ---------------------------------------------------------------------------------------------------- */
 
 typedef struct use {
   int32_t cell, low, high;
@@ -110,7 +110,8 @@ static void area_vector(const remap_supermesh_view *v, int64_t f, double out[3])
   out[0] = out[1] = out[2] = 0;
   for (int64_t k = 1; k + 1 < v->face_offset[f + 1] - v->face_offset[f]; k++) {
     double a[3], b[3];
-    for (int c = 0; c < 3; c++) a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
+    for (int c = 0; c < 3; c++)
+      a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
     for (int c = 0; c < 3; c++) out[c] += a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
   }
 }
@@ -136,8 +137,8 @@ static double *volumes_by_faces(const remap_supermesh_view *v)
   return volume;
 }
 
-/* On one rank: numbers are places; by ancestors the volumes of the union are those of the pairs and of the given cells, to 1e-12 of the
- * smaller cell. */
+/* On one rank: numbers are places; by ancestors the volumes of the union are those of the pairs and of the given cells, to
+ * 1e-12 of the smaller cell. */
 static void is_the_union(const world *w)
 {
   const remap_supermesh_view *v = &w->v;
@@ -147,7 +148,8 @@ static void is_the_union(const world *w)
   remap_pairs_view            p;
   remap_options               how;
 
-  RT_CHECK(v->num_cells == v->global_cells && v->num_faces == v->global_faces && v->num_nodes == v->global_nodes && v->num_beyond == 0);
+  RT_CHECK(v->num_cells == v->global_cells && v->num_faces == v->global_faces && v->num_nodes == v->global_nodes &&
+           v->num_beyond == 0);
   for (int64_t k = 0; k < v->num_cells; k++) RT_EQ(v->cell_global[k], k);
   remap_options_default(&how);
   how.faces = w->faces;
@@ -176,7 +178,7 @@ static void is_the_union(const world *w)
   free(pair);
 }
 
-/* ---- several ranks ------------------------------------------------------------------------------------------------------------- */
+/* ---- several ranks ----------------------------------------------------------------------------------------------- */
 
 /* What this rank has of the whole is what one rank alone has. */
 static void same_bits(const remap_supermesh_view *all, const remap_supermesh_view *v)
@@ -187,7 +189,8 @@ static void same_bits(const remap_supermesh_view *all, const remap_supermesh_vie
   RT_EQ(v->global_faces, all->num_faces);
   RT_EQ(v->global_nodes, all->num_nodes);
   if (v->global_cells != all->num_cells || v->global_faces != all->num_faces || v->global_nodes != all->num_nodes) return;
-  for (int64_t k = 0; k < v->num_nodes; k++) bad += memcmp(v->node_xyz + 3 * k, all->node_xyz + 3 * v->node_global[k], 3 * sizeof(double)) != 0;
+  for (int64_t k = 0; k < v->num_nodes; k++)
+    bad += memcmp(v->node_xyz + 3 * k, all->node_xyz + 3 * v->node_global[k], 3 * sizeof(double)) != 0;
   RT_EQ(bad, 0);
   for (int64_t c = 0; c < v->num_cells; c++) {
     const int64_t g = v->cell_global[c];
@@ -236,7 +239,7 @@ static void look(const plan *p)
   close_world(&alone), close_world(&together);
 }
 
-/* ---- cases --------------------------------------------------------------------------------------------------------------------- */
+/* ---- cases ------------------------------------------------------------------------------------------------------- */
 
 static tm_mesh *warped(int side, uint64_t seed)
 {
@@ -259,7 +262,8 @@ static void one_rank_and_many_make_the_same(void)
   static const int keep[] = {UNION, REMAP_IN_BOTH, REMAP_IN_SOURCE, REMAP_IN_TARGET, REMAP_IN_BOTH | REMAP_IN_SOURCE};
 
   for (uint64_t seed = 1; seed <= 5; seed++) {
-    const plan p = {warped, seed, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, {keep[seed - 1], 0, 0, seed != 4}, seed == 2, false};
+    const plan p = {warped,    seed, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, {keep[seed - 1], 0, 0, seed != 4},
+                    seed == 2, false};
     look(&p);
   }
 }
@@ -271,7 +275,9 @@ static tm_mesh *small_in_large(int side, uint64_t seed)
   const tm_warping    warp      = {.02, .3 * (double)seed};
   tm_mesh            *m;
 
-  if (side == 0) return seed % 2 ? tm_two_zones((int[]){4, 7, 6}, (int[]){5, 7, 6}, 0, tm_warp, &warp) : tm_hexahedra((int[]){9, 7, 8}, tm_warp, &warp);
+  if (side == 0)
+    return seed % 2 ? tm_two_zones((int[]){4, 7, 6}, (int[]){5, 7, 6}, 0, tm_warp, &warp)
+                    : tm_hexahedra((int[]){9, 7, 8}, tm_warp, &warp);
   m = tm_tetrahedra((int[]){3, 3, 2}, NULL, NULL);
   tm_move(m, tm_affine, small);
   return m;
@@ -280,7 +286,12 @@ static tm_mesh *small_in_large(int side, uint64_t seed)
 static void cells_that_meet_nothing_pass_through(void)
 {
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    const plan p = {small_in_large, seed, seed % 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, {seed == 4 ? REMAP_IN_SOURCE : UNION, 0, 0, 1}, false, false};
+    const plan p = {small_in_large,
+                    seed,
+                    seed % 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE,
+                    {seed == 4 ? REMAP_IN_SOURCE : UNION, 0, 0, 1},
+                    false,
+                    false};
     world      w;
     int64_t    whole = 0;
 
@@ -296,7 +307,12 @@ static void cells_that_meet_nothing_pass_through(void)
 static void pieces_of_warped_faces_come_together(void)
 {
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    plan    p = {seed == 4 ? small_in_large : warped, seed, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, {UNION, 0, 0, 1}, false, false};
+    plan p = {seed == 4 ? small_in_large : warped,
+              seed,
+              seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL,
+              {UNION, 0, 0, 1},
+              false,
+              false};
     world   w;
     int64_t faces;
 
@@ -414,5 +430,5 @@ static void concave_faces_are_cut(void)
 }
 
 RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothing_pass_through),
-        RT_CASE(meshes_that_touch_in_every_way_are_the_same_on_any_ranks),
-        RT_CASE(pieces_of_warped_faces_come_together), RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut))
+        RT_CASE(meshes_that_touch_in_every_way_are_the_same_on_any_ranks), RT_CASE(pieces_of_warped_faces_come_together),
+        RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut))

@@ -1,5 +1,6 @@
-/* Closed surfaces, meshes of one cell each: booleans of two of them in every position, also where they share faces, edges or a vertex,
- * and a surface in a grid. Octahedra on the integer lattice, so that volumes and areas are exact and many faces lie on each other. */
+/* Closed surfaces, meshes of one cell each: booleans of two of them in every position, also where they share faces, edges or
+ * a vertex, and a surface in a grid. Octahedra on the integer lattice, so that volumes and areas are exact and many faces
+ * lie on each other. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
@@ -50,7 +51,8 @@ static void area_vector(const remap_supermesh_view *v, int64_t f, double out[3])
   out[0] = out[1] = out[2] = 0;
   for (int64_t k = 1; k + 1 < v->face_offset[f + 1] - v->face_offset[f]; k++) {
     double a[3], b[3];
-    for (int c = 0; c < 3; c++) a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
+    for (int c = 0; c < 3; c++)
+      a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
     for (int c = 0; c < 3; c++) out[c] += a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
   }
 }
@@ -106,8 +108,9 @@ static amount amount_of(tm_mesh *a, tm_mesh *b, int keep)
 
 static void every_position_adds_up(void)
 {
-  static const int shift[][4] = {{1, 0, 0, 4}, {2, 1, 0, 4}, {1, 1, 1, 4}, {2, 2, 0, 4}, {4, 4, 0, 4}, {8, 0, 0, 4}, {4, 2, 2, 4}, {0, 0, 0, 2},
-                                 {2, 0, 0, 2}, {1, 1, 0, 2}, {3, 0, 0, 2}, {6, 0, 0, 2}, {3, 3, 0, 2}, {9, 1, 0, 4}, {1, 2, 3, 3}, {5, 1, 2, 3}};
+  static const int shift[][4] = {{1, 0, 0, 4}, {2, 1, 0, 4}, {1, 1, 1, 4}, {2, 2, 0, 4}, {4, 4, 0, 4}, {8, 0, 0, 4},
+                                 {4, 2, 2, 4}, {0, 0, 0, 2}, {2, 0, 0, 2}, {1, 1, 0, 2}, {3, 0, 0, 2}, {6, 0, 0, 2},
+                                 {3, 3, 0, 2}, {9, 1, 0, 4}, {1, 2, 3, 3}, {5, 1, 2, 3}};
 
   for (size_t k = 0; k < sizeof shift / sizeof *shift; k++)
     for (int n = 2; n <= 4; n += 2) {
@@ -164,7 +167,7 @@ static void surfaces_that_only_touch_share_no_volume(void)
   }
 }
 
-/* ---- a surface in a grid --------------------------------------------------------------------------------------------------------- */
+/* ---- a surface in a grid ----------------------------------------------------------------------------------------- */
 
 static void place(double xyz[3], const void *data)
 {
@@ -192,7 +195,8 @@ static void a_body_is_cut_from_a_grid(void)
       RT_EQ(r.v.cell_ancestor[1][c], -1);
       sum[0] += r.v.cell_volume[c];
     }
-    RT_EQ(remap_supermesh_cell_values(r.ctx, REMAP_TARGET, NULL, -1, got), r.mine[1]->view.num_cells || rt_size() > 1 ? REMAP_BAD_ARGUMENT : REMAP_OK);
+    RT_EQ(remap_supermesh_cell_values(r.ctx, REMAP_TARGET, NULL, -1, got),
+          r.mine[1]->view.num_cells || rt_size() > 1 ? REMAP_BAD_ARGUMENT : REMAP_OK);
     RT_EQ(remap_supermesh_face_values(r.ctx, REMAP_TARGET, tag, -1, tagged), REMAP_OK);
     for (int64_t f = 0, next = 0; f < r.v.num_faces; f++) {
       const bool beyond = next < r.v.num_beyond && r.v.beyond_face[next] == f;
@@ -253,6 +257,6 @@ static void what_is_wrong_is_told(void)
   remap_destroy(&ctx);
 }
 
-RT_MAIN(RT_CASE(every_position_adds_up), RT_CASE(identical_surfaces_are_one), RT_CASE(surfaces_of_one_shape_leave_no_difference),
-        RT_CASE(surfaces_that_only_touch_share_no_volume), RT_CASE(a_body_is_cut_from_a_grid), RT_CASE(an_inverted_surface_is_refused),
-        RT_CASE(what_is_wrong_is_told))
+RT_MAIN(RT_CASE(every_position_adds_up), RT_CASE(identical_surfaces_are_one),
+        RT_CASE(surfaces_of_one_shape_leave_no_difference), RT_CASE(surfaces_that_only_touch_share_no_volume),
+        RT_CASE(a_body_is_cut_from_a_grid), RT_CASE(an_inverted_surface_is_refused), RT_CASE(what_is_wrong_is_told))

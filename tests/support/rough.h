@@ -1,5 +1,5 @@
-/* rough -- random meshes whose coordinates have so few bits that vertices, edges and faces of two of them coincide, cross and touch in
- * every way. *seed goes on, so that the next mesh is another one. */
+/* rough -- random meshes whose coordinates have so few bits that vertices, edges and faces of two of them coincide, cross
+ * and touch in every way. *seed goes on, so that the next mesh is another one. */
 #ifndef ROUGH_H
 #define ROUGH_H
 

@@ -1,5 +1,5 @@
-/* super -- the supermesh of two test meshes, and what must hold of it: closed cells, each of their edges in two faces, volumes as
- * the moments have them, faces that cover those they came from, no vertex inside an edge.
+/* super -- the supermesh of two test meshes, and what must hold of it: closed cells, each of their edges in two faces,
+ * volumes as the moments have them, faces that cover those they came from, no vertex inside an edge.
  *
  *   super s = super_of(source, target, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
  *   super_check(&s, 0, false);
@@ -35,7 +35,7 @@ static inline super super_of(const tm_mesh *source, const tm_mesh *target, remap
   return s;
 }
 
-/* ---- what a supermesh must be -------------------------------------------------------------------------------------------- */
+/* ---- what a supermesh must be ------------------------------------------------------------------------------------ */
 
 static inline void super_area_vector_(const rm_cells *m, rm_lid f, double out[3])
 {
@@ -56,7 +56,8 @@ static inline void super_check_volumes(const super *s)
   const laid       *l = s->l;
   const rm_moments *p = l->moments;
   const rm_lid      n[2] = {l->mesh[0]->num_cells, l->mesh[1]->num_cells};
-  double           *sum = tm_alloc_((int64_t)n[0] * n[1], sizeof *sum), *row[2] = {tm_alloc_(n[0], sizeof(double)), tm_alloc_(n[1], sizeof(double))};
+  double           *sum  = tm_alloc_((int64_t)n[0] * n[1], sizeof *sum),
+         *row[2]         = {tm_alloc_(n[0], sizeof(double)), tm_alloc_(n[1], sizeof(double))};
 
   for (rm_lid c = 0; c < s->cells->num_cells; c++) {
     const rm_lid *a = s->cells->cell_ancestor[c];
@@ -95,7 +96,8 @@ static inline void super_faces_are_covered_(const super *s)
     }
     for (rm_lid t = 0; t < m->num_triangles; t++) {
       const double *v = m->normal[t];
-      if (t && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle)) continue; /* counts as the first that lies there */
+      if (t && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle))
+        continue; /* counts as the first that lies there */
       area[rm_face_of_triangle(m, t)] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
     for (rm_lid f = 0; f < n; f++)
@@ -114,7 +116,8 @@ static inline void super_edges_are_whole_(const super *s)
 
   for (rm_lid f = 0; f < m->num_faces; f++)
     for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) {
-      const double *a = m->vertex[m->face_vertex[k]], *b = m->vertex[m->face_vertex[k + 1 < m->face_offset[f + 1] ? k + 1 : m->face_offset[f]]];
+      const double *a = m->vertex[m->face_vertex[k]],
+                   *b = m->vertex[m->face_vertex[k + 1 < m->face_offset[f + 1] ? k + 1 : m->face_offset[f]]];
       for (rm_lid v = 0; v < m->num_vertices; v++) {
         const double *p = m->vertex[v];
         double        uu = 0, up = 0, off = 0;
@@ -132,8 +135,8 @@ typedef struct super_use_ {
 } super_use_;
 static inline int super_by_use_(const void *a, const void *b) { return memcmp(a, b, sizeof(super_use_)); }
 
-/* Every edge of a cell lies in two of its faces, and V - E + F is 2 for all cells but odd_cells, which have voids or handles. -1: any
- * number of them, and cells may touch themselves along an edge. */
+/* Every edge of a cell lies in two of its faces, and V - E + F is 2 for all cells but odd_cells, which have voids or
+ * handles. -1: any number of them, and cells may touch themselves along an edge. */
 static inline void super_cells_are_manifold_(const super *s, int odd_cells)
 {
   const rm_cells *m    = s->cells;
@@ -174,8 +177,8 @@ static inline void super_cells_are_manifold_(const super *s, int odd_cells)
   free(seen);
 }
 
-/* All of it, for SUPER_UNION. odd_cells: as many cells have voids or handles, -1: any number. coarse: coordinates have so few bits
- * that points within 1e-13 are equal. */
+/* All of it, for SUPER_UNION. odd_cells: as many cells have voids or handles, -1: any number. coarse: coordinates have so
+ * few bits that points within 1e-13 are equal. */
 static inline void super_check(const super *s, int odd_cells, bool coarse)
 {
   if (!RT_EQ(s->status, REMAP_OK)) {

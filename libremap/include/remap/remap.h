@@ -336,14 +336,15 @@ typedef struct remap_supermesh_options {
                           else also where they are not, wherever that leaves cells closed; the polygons' volumes are then not
                           those of the cells */
   int split_concave; /**< not 0: concave polygons are cut into convex ones; default 0 */
-  int pass_through;  /**< not 0 (default): cells that meet nothing of the other mesh are part of the result, as they were given */
+  int pass_through;  /**< not 0 (default): cells that meet nothing of the other mesh are part of the result, as they were
+                          given */
 } remap_supermesh_options;
 
-/** The part of a supermesh that one rank makes: a conformal mesh of polyhedra. Each cell lies in at most one source cell and at
- *  most one target cell, its ancestors; faces of the two meshes that coincide are one face. A face between cells of two ranks is
- *  on both, a node on all that need it. Numbers named global depend on the meshes' coordinates alone, start from 0 and ascend on
- *  each rank; on one rank they are the places in these arrays. Everything is owned by the context and valid until the next
- *  remap_supermesh, remap_build, remap_move or remap_destroy. */
+/** The part of a supermesh that one rank makes: a conformal mesh of polyhedra. Each cell lies in at most one source cell and
+ *  at most one target cell, its ancestors; faces of the two meshes that coincide are one face. A face between cells of two
+ *  ranks is on both, a node on all that need it. Numbers named global depend on the meshes' coordinates alone, start from 0
+ *  and ascend on each rank; on one rank they are the places in these arrays. Everything is owned by the context and valid
+ *  until the next remap_supermesh, remap_build, remap_move or remap_destroy. */
 typedef struct remap_supermesh_view {
   int64_t        num_nodes, num_faces, num_cells;
   int64_t        global_nodes, global_faces, global_cells; /**< of all ranks, each counted once */
@@ -354,11 +355,11 @@ typedef struct remap_supermesh_view {
   const int32_t *face_owner;        /**< [num_faces] cell of this rank                                    */
   const int32_t *face_neighbour;    /**< [num_faces] cell of this rank, -1 if there is none here          */
   const int64_t *face_global;       /**< [num_faces]                                                      */
-  const int32_t *face_from[2];      /**< [side][num_faces] the face of that mesh it lies in, by its number on the rank that lent it,
-                                         block after block (of two that join, one); -1: none */
+  const int32_t *face_from[2];      /**< [side][num_faces] the face of that mesh it lies in, by its number on the rank that
+                                         lent it, block after block (of two that join, one); -1: none */
   const int32_t *face_from_rank[2]; /**< [side][num_faces] that rank, -1                                  */
-  int64_t        num_beyond;        /**< faces without neighbour here behind which lies a cell of another rank; all others without
-                                         are on the boundary of what was made */
+  int64_t        num_beyond;        /**< faces without neighbour here behind which lies a cell of another rank; all others
+                                         without are on the boundary of what was made */
   const int32_t *beyond_face;       /**< [num_beyond] ascending                                           */
   const int64_t *beyond_cell;       /**< [num_beyond] that cell, by its global number                     */
   const int64_t *cell_global;       /**< [num_cells]                                                      */
@@ -485,23 +486,25 @@ REMAP_API remap_status remap_cells(remap_context *ctx, remap_side side, double *
 /** Set every member to its default. Not collective. */
 REMAP_API void remap_supermesh_options_default(remap_supermesh_options *options);
 
-/** Make the supermesh of the two meshes, or a part of it. Collective. Needs no remap_build: without an overlay the meshes are read
- *  here and are lent until this returns; after a remap_build or remap_move it is made of the meshes as they stand. Neither the
- *  overlay nor a transfer is touched. Each rank makes an even share of the cells. A closed surface is a mesh of one cell. Cells of
- *  one mesh must not overlap, cross each other or be inverted; faces may be warped, coincide with others, have no area, and cells
- *  no volume. options must agree on all ranks; NULL means the defaults.
+/** Make the supermesh of the two meshes, or a part of it. Collective. Needs no remap_build: without an overlay the meshes are
+ *  read here and are lent until this returns; after a remap_build or remap_move it is made of the meshes as they stand.
+ *  Neither the overlay nor a transfer is touched. Each rank makes an even share of the cells. A closed surface is a mesh of
+ *  one cell. Cells of one mesh must not overlap, cross each other or be inverted; faces may be warped, coincide with others,
+ *  have no area, and cells no volume. options must agree on all ranks; NULL means the defaults.
  *  Errors: BAD_ORDER (a mesh is missing), BAD_ARGUMENT, BAD_MESH, TOO_LARGE, NO_MEMORY, MPI_FAILURE, CANCELLED, INCONSISTENT;
- *  remap_message names a cell. */
+ *  remap_message tells which cell, where it is one. */
 REMAP_API remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *options, remap_supermesh_view *out);
 
-/** Take what belongs to cells of one mesh over to the cells of the supermesh: out[c] = in[the ancestor of c in that mesh], or none
- *  where it has none. in [cells of that side on this rank, block after block] and out [num_cells of the view] are the caller's.
- *  Collective, after remap_supermesh. Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
-REMAP_API remap_status remap_supermesh_cell_values(remap_context *ctx, remap_side side, const double *in, double none, double *out);
+/** Take what belongs to cells of one mesh over to the cells of the supermesh: out[c] = in[the ancestor of c in that mesh], or
+ *  none where it has none. in [cells of that side on this rank, block after block] and out [num_cells of the view] are the
+ *  caller's. Collective, after remap_supermesh. Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
+REMAP_API remap_status remap_supermesh_cell_values(remap_context *ctx, remap_side side, const double *in, double none,
+                                                   double *out);
 
-/** The same for faces, say with the number of a boundary condition: out[f] = in[the face of that mesh in which f lies], or none.
- *  in [faces of that side on this rank, block after block] and out [num_faces of the view] are the caller's. */
-REMAP_API remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none, int32_t *out);
+/** The same for faces, say with the number of a boundary condition: out[f] = in[the face of that mesh in which f lies], or
+ *  none. in [faces of that side on this rank, block after block] and out [num_faces of the view] are the caller's. */
+REMAP_API remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none,
+                                                   int32_t *out);
 
 /** End a context and set *ctx to NULL. Collective, and harmless on a NULL context. */
 REMAP_API void remap_destroy(remap_context **ctx);

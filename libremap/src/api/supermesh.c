@@ -16,7 +16,8 @@ void rm_context_drop_super(remap_context *ctx)
 }
 
 /* Options are good and the same on all ranks; *is_built if every rank has an overlay. Collective. */
-static remap_status agree_on_options(remap_context *ctx, const remap_supermesh_options *o, bool has_out, bool *is_built, rm_reason *reason)
+static remap_status agree_on_options(remap_context *ctx, const remap_supermesh_options *o, bool has_out, bool *is_built,
+                                     rm_reason *reason)
 {
   const int64_t mine[5]    = {o->keep, o->aggregate != 0, o->split_concave != 0, o->pass_through != 0, !ctx->is_built};
   int64_t       extreme[9];
@@ -39,7 +40,8 @@ static remap_status agree_on_options(remap_context *ctx, const remap_supermesh_o
 }
 
 /* The meshes as they stand, or read now. Collective. */
-static remap_status supermesh(remap_context *ctx, const remap_supermesh_options *options, bool has_out, rm_arena *passing, rm_reason *reason)
+static remap_status supermesh(remap_context *ctx, const remap_supermesh_options *options, bool has_out, rm_arena *passing,
+                              rm_reason *reason)
 {
   const rm_progress  progress = {ctx->options.progress, ctx->options.user};
   const rm_super_job job      = {&ctx->comm, &ctx->frame, ctx->mesh, ctx->options.faces, options, &progress};
@@ -81,7 +83,7 @@ remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *
   return REMAP_OK;
 }
 
-/* ---- what belongs to the operands --------------------------------------------------------------------------------------------- */
+/* ---- what belongs to the operands -------------------------------------------------------------------------------- */
 
 /* Entities of other ranks that this rank wants. */
 typedef struct wants {
@@ -114,8 +116,8 @@ static remap_status sort_wants(rm_arena *passing, int64_t n, const int32_t *from
 }
 
 /* out[k] = in[origin of k], `size` bytes each, where there is one. Collective. */
-static remap_status fetch(remap_context *ctx, rm_arena *passing, int64_t n, const int32_t *from, const int32_t *from_rank, size_t size,
-                          const void *in, void *out)
+static remap_status fetch(remap_context *ctx, rm_arena *passing, int64_t n, const int32_t *from, const int32_t *from_rank,
+                          size_t size, const void *in, void *out)
 {
   const rm_comm *comm = &ctx->comm;
   const rm_plan *plan;
@@ -160,7 +162,8 @@ remap_status remap_supermesh_cell_values(remap_context *ctx, remap_side side, co
   remap_status status;
 
   for (int64_t c = 0; c < ctx->super->view.num_cells; c++) out[c] = none;
-  status = fetch(ctx, passing, ctx->super->view.num_cells, ctx->super->cell_home[side], ctx->super->cell_rank[side], sizeof *in, in, out);
+  status = fetch(ctx, passing, ctx->super->view.num_cells, ctx->super->cell_home[side], ctx->super->cell_rank[side], sizeof *in,
+                 in, out);
   rm_arena_drop(passing);
   return status;
 }

@@ -1,5 +1,6 @@
-/* arcs -- edges of polygons, found vertex by vertex: filed are only the polygons at each vertex that have an edge from it to a higher
- * one, 4 bytes each; the edges are read from their loops and sorted when they are asked for, among the few of one vertex. */
+/* arcs -- edges of polygons, found vertex by vertex: filed are only the polygons at each vertex that have an edge from it to
+ * a higher one, 4 bytes each; the edges are read from their loops and sorted when they are asked for, among the few of one
+ * vertex. */
 #include "cells/cells_private.h"
 
 #include <stdlib.h>

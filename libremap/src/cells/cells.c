@@ -21,7 +21,7 @@ typedef struct work {
   rm_cells        *out;
 } work;
 
-/* ---- stages ------------------------------------------------------------------------------------------------------------- */
+/* ---- stages ------------------------------------------------------------------------------------------------------ */
 
 static remap_status make_polygons(work *w, const rm_overlay *overlay, rm_arena **overlay_arena, rm_reason *reason)
 {
@@ -55,7 +55,8 @@ static remap_status make_cells(work *w, rm_reason *reason)
 
   if (status == REMAP_OK) status = rm_glue(w->scratch, w->l, &w->p, &arcs, &w->glued);
   if (status == REMAP_BAD_MESH)
-    rm_fail(status, reason, -1, -1, "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap or are inverted");
+    rm_fail(status, reason, -1, -1,
+            "the faces around an edge of the supermesh do not bound cells: cells of one mesh overlap or are inverted");
   w->out->seconds_glue = rm_seconds() - start;
   if (status == REMAP_OK) status = rm_faces_build(w->scratch, passing, w->l, &w->p, &arcs, &w->glued,
                                                   w->choice->aggregate, &w->faces);
@@ -64,7 +65,7 @@ static remap_status make_cells(work *w, rm_reason *reason)
   return status;
 }
 
-/* ---- selection ----------------------------------------------------------------------------------------------------------- */
+/* ---- selection --------------------------------------------------------------------------------------------------- */
 
 static bool is_kept(rm_label label, const rm_cells_choice *choice)
 {
@@ -96,7 +97,8 @@ static remap_status select_cells(work *w)
   return REMAP_OK;
 }
 
-/* Cells beside polygon k in the result, the lower one first; false if neither is kept. *turned if its loop runs the wrong way. */
+/* Cells beside polygon k in the result, the lower one first; false if neither is kept. *turned if its loop runs the wrong
+ * way. */
 static bool cells_beside(const work *w, int64_t k, rm_lid cell[2], bool *turned)
 {
   for (int h = 0; h < 2; h++) cell[h] = w->glued.cell[2 * k + h] < 0 ? RM_OUTSIDE : w->new_cell[w->glued.cell[2 * k + h]];
@@ -108,7 +110,7 @@ static bool cells_beside(const work *w, int64_t k, rm_lid cell[2], bool *turned)
   return cell[0] >= 0;
 }
 
-/* ---- faces ---------------------------------------------------------------------------------------------------------------- */
+/* ---- faces ------------------------------------------------------------------------------------------------------- */
 
 typedef struct face {
   rm_polygon   *of;
@@ -119,8 +121,8 @@ typedef struct face {
 
 typedef void visitor(work *w, const face *f, void *user);
 
-/* Visit the face, or the convex parts of it if it is concave and that is wanted. Its loop runs counter-clockwise about its triangle's
- * normal. */
+/* Visit the face, or the convex parts of it if it is concave and that is wanted. Its loop runs counter-clockwise about its
+ * triangle's normal. */
 static void visit_face(work *w, const face *f, visitor *visit, void *user)
 {
   face part = *f;
@@ -279,7 +281,7 @@ static remap_status make_faces(work *w)
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason)
 {
-  work         w      = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part, .choice = choice};
+  work         w = {.arena = arena, .scratch = rm_arena_new(), .limit_arena = rm_arena_new(), .part = part, .choice = choice};
   remap_status status = w.scratch && w.limit_arena ? REMAP_OK : REMAP_NO_MEMORY;
 
   w.out = rm_arena_zero(arena, 1, sizeof *w.out);

@@ -1,10 +1,12 @@
-/* cells -- the supermesh itself: the overlay in; explicit minimal polyhedra (maPH cells) out, with their ancestors (DESIGN 2.8).
+/* cells -- the supermesh itself: the overlay in; explicit minimal polyhedra (maPH cells) out, with their ancestors (DESIGN
+ * 2.8).
  *
- * Where the overlay thinks mesh 2 moved by an infinitesimal, the supermesh is taken in the limit: its vertices, edges and polygons
- * are the meetings of a vertex, edge, triangle of one mesh with those or a cell of the other, at their exact places. So no piece
- * of zero volume, area or length exists, coincident faces of the two meshes are one face, and the result is conformal: a face has
- * one or two cells, every edge of a cell lies in two of its faces (four where a cell touches itself along it), every cell is
- * closed. Whether two features meet, and in which order, is decided exactly; coordinates are rounded last. */
+ * Where the overlay thinks mesh 2 moved by an infinitesimal, the supermesh is taken in the limit: its vertices, edges and
+ * polygons are the meetings of a vertex, edge, triangle of one mesh with those or a cell of the other, at their exact
+ * places. So no piece of zero volume, area or length exists, coincident faces of the two meshes are one face, and the result
+ * is conformal: a face has one or two cells, every edge of a cell lies in two of its faces (four where a cell touches itself
+ * along it), every cell is closed. Whether two features meet, and in which order, is decided exactly; coordinates are
+ * rounded last. */
 #ifndef RM_CELLS_H
 #define RM_CELLS_H
 
@@ -54,16 +56,16 @@ typedef struct rm_cells {
 /* False if the corners of triangle t are on a line. Exact. Not collective. */
 bool rm_has_area(const rm_trimesh *m, rm_lid t);
 
-/* The triangulation without flat triangles, which have their corners on a line: they are left out, and others are cut where such
- * a one had a vertex on their edge, so that what is left is conformal and bounds the same volumes. *out is mesh itself if it has
- * none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */
+/* The triangulation without flat triangles, which have their corners on a line: they are left out, and others are cut where
+ * such a one had a vertex on their edge, so that what is left is conformal and bounds the same volumes. *out is mesh itself
+ * if it has none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */
 remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out);
 
-/* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
- * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH with the
- * reason if cells of one mesh overlap or cross each other. The meshes of the overlay have no flat triangles: see rm_cells_mesh.
- * *passing (may be NULL) is the arena that holds the overlay, but not its meshes: it is dropped, and NULL then, as soon as it is used
- * up. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
+/* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they
+ * are coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena.
+ * BAD_MESH with the reason if cells of one mesh overlap or cross each other. The meshes of the overlay have no flat
+ * triangles: see rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but not its meshes: it is
+ * dropped, and NULL then, as soon as it is used up. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason);
 

@@ -37,8 +37,8 @@ typedef struct rm_limit {
   const rm_lid     *inner_spot[2];   /* vertices of the other mesh inside the triangle                         */
 } rm_limit;
 
-/* Lives in arena, but for what only polygons are made from, which lives in passing: crossing_spot, lines, inner. BAD_MESH with the
- * reason where cells overlap. */
+/* Lives in arena, but for what only polygons are made from, which lives in passing: crossing_spot, lines, inner. BAD_MESH
+ * with the reason where cells overlap. */
 remap_status rm_limit_build(rm_arena *arena, rm_arena *passing, const rm_part *part, const rm_overlay *o, const rm_limit **out,
                             rm_reason *reason);
 
@@ -64,7 +64,7 @@ static inline bool rm_in_triangle(const rm_limit *l, int side, rm_feature f, rm_
   return x[0] == f.id || x[1] == f.id || x[2] == f.id;
 }
 
-/* ---- exact signs -------------------------------------------------------------------------------------------------- */
+/* ---- exact signs ------------------------------------------------------------------------------------------------- */
 
 /* A point off the plane of a, b, c, on the side that its normal points to; false if they are on one line. */
 bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3]);
@@ -73,7 +73,8 @@ bool rm_off_plane(const double a[3], const double b[3], const double c[3], doubl
  * line[0] is that. */
 bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3]);
 
-/* For a spot inside an edge of mesh `side`: three points of a plane, not along that edge, in which the other mesh has the spot. */
+/* For a spot inside an edge of mesh `side`: three points of a plane, not along that edge, in which the other mesh has the
+ * spot. */
 void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double plane[3][3]);
 
 /* Signs within one triangle's plane, seen from its normal's tip: projected along axis. */
@@ -88,7 +89,7 @@ int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r);
 /* Sign of p's coordinate less q's on an axis. Exact. */
 int rm_compare(const rm_limit *l, rm_lid p, rm_lid q, int axis);
 
-/* ---- polygons ------------------------------------------------------------------------------------------------------ */
+/* ---- polygons ---------------------------------------------------------------------------------------------------- */
 
 typedef struct rm_label {
   rm_lid cell[2]; /* [side] RM_OUTSIDE */
@@ -146,7 +147,7 @@ bool rm_is_convex(const rm_view *view, const rm_lid *loop, rm_lid n);
 /* Cut a loop, which runs counter-clockwise, into convex ones; what out held is forgotten. NO_MEMORY. */
 remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, rm_parts *out);
 
-/* ---- edges of polygons ----------------------------------------------------------------------------------------------- */
+/* ---- edges of polygons ------------------------------------------------------------------------------------------- */
 
 /* One polygon's edge. */
 typedef struct rm_arc {
@@ -169,7 +170,7 @@ remap_status rm_arcs_build(rm_arena *arena, rm_lid num_vertices, const rm_polygo
 /* How many edges have this lower vertex; they are in arcs->arc then, by their higher vertex, then by polygon. O(n log n). */
 rm_lid rm_arcs_at(const rm_arcs *arcs, rm_lid low);
 
-/* ---- cells ----------------------------------------------------------------------------------------------------------- */
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
 
 /* cell[2 k] and cell[2 k + 1] are the cells left and right of polygon k, RM_OUTSIDE; label and volume of each cell. All live in
  * arena. BAD_MESH if the polygons around an edge do not bound cells. */
@@ -181,7 +182,8 @@ typedef struct rm_glued {
 } rm_glued;
 remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, rm_glued *out);
 
-/* Which polygons make one face. Its loop is counter-clockwise about the normal out of the lower cell, RM_OUTSIDE being the highest. */
+/* Which polygons make one face. Its loop is counter-clockwise about the normal out of the lower cell, RM_OUTSIDE being the
+ * highest. */
 typedef struct rm_faces {
   int64_t        num;    /* groups                                                      */
   const int64_t *offset; /* [num + 1]                                                   */
@@ -190,12 +192,13 @@ typedef struct rm_faces {
   rm_lid        *next;   /* scratch of rm_face_loop, [num_spots]                        */
 } rm_faces;
 
-/* Group pieces of one face between the same two cells: coplanar ones; if warped, all whose loop is one of a polygon that some plane
- * shows without folds, and is not that of another group all around. Lives in arena; passing is for what is not kept. */
+/* Group pieces of one face between the same two cells: coplanar ones; if warped, all whose loop is one of a polygon that
+ * some plane shows without folds, and is not that of another group all around. Lives in arena; passing is for what is not
+ * kept. */
 remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs,
                             const rm_glued *glued, bool warped, rm_faces *out);
-/* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself nowhere: its
- * members then are faces as they are. */
+/* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself
+ * nowhere: its members then are faces as they are. */
 rm_lid rm_face_loop(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t k, rm_lid *loop);
 /* True if polygon k has to be turned so that its normal points out of the lower cell. */
 static inline bool rm_is_turned(const rm_glued *glued, int64_t k)

@@ -1,5 +1,5 @@
-/* check -- tests every invariant of the cells: loops, closed cells, edges of a cell in two of its faces or paired along a contact,
- * volumes. O(n log n). */
+/* check -- tests every invariant of the cells: loops, closed cells, edges of a cell in two of its faces or paired along a
+ * contact, volumes. O(n log n). */
 #include "cells/cells.h"
 
 #include <math.h>
@@ -69,7 +69,8 @@ remap_status rm_cells_check(const rm_cells *cells)
 
   if (status == REMAP_OK && !(loops_are_right(cells, seen) && cells_are_closed(cells, list))) status = REMAP_INTERNAL;
   for (rm_lid c = 0; c < cells->num_cells && status == REMAP_OK; c++)
-    if (!(cells->cell_volume[c] > -0x1p-44) || (cells->cell_ancestor[c][0] < 0 && cells->cell_ancestor[c][1] < 0)) status = REMAP_INTERNAL;
+    if (!(cells->cell_volume[c] > -0x1p-44) || (cells->cell_ancestor[c][0] < 0 && cells->cell_ancestor[c][1] < 0))
+      status = REMAP_INTERNAL;
   rm_arena_drop(scratch);
   return status;
 }

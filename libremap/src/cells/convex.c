@@ -1,6 +1,6 @@
-/* convex -- a concave polygon cut into convex ones (DESIGN 2.8): it is triangulated on its own vertices; then, again and again, the
- * vertex of the largest angle is cut from along the triangles' edge that leaves an angle below half a turn and closest to it. Which
- * angles are below half a turn is exact, so every part is convex. O(n^2) for n vertices. */
+/* convex -- a concave polygon cut into convex ones (DESIGN 2.8): it is triangulated on its own vertices; then, again and
+ * again, the vertex of the largest angle is cut from along the triangles' edge that leaves an angle below half a turn and
+ * closest to it. Which angles are below half a turn is exact, so every part is convex. O(n^2) for n vertices. */
 #include "cells/cells_private.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
-/* faces -- pieces of one face between the same two cells put together again: across edges that no other polygon has, if what results
- * has one loop that meets itself nowhere. Pieces that are exactly coplanar leave volumes as they are; others come together only if
- * asked for. O(n), expected. */
+/* faces -- pieces of one face between the same two cells put together again: across edges that no other polygon has, if what
+ * results has one loop that meets itself nowhere. Pieces that are exactly coplanar leave volumes as they are; others come
+ * together only if asked for. O(n), expected. */
 #include "cells/cells_private.h"
 
 #include <string.h>
@@ -92,7 +92,7 @@ static remap_status group_pieces(rm_arena *arena, const grouping *g, rm_lid *par
   return REMAP_OK;
 }
 
-/* ---- warped groups --------------------------------------------------------------------------------------------------------- */
+/* ---- warped groups ----------------------------------------------------------------------------------------------- */
 
 enum { CANDIDATES = 6 };
 
@@ -118,8 +118,10 @@ static void meet(company *c, rm_lid g, const rm_lid *present, rm_lid n)
   c->any = true;
 }
 
-/* Mark groups all of whose sides are sides of one other group too: as polygons of one loop they would leave nothing between them. */
-static remap_status mark_enclosed(rm_arena *passing, const grouping *g, const rm_lid *group_of, const rm_faces *faces, uint8_t *bad)
+/* Mark groups all of whose sides are sides of one other group too: as polygons of one loop they would leave nothing between
+ * them. */
+static remap_status mark_enclosed(rm_arena *passing, const grouping *g, const rm_lid *group_of, const rm_faces *faces,
+                                  uint8_t *bad)
 {
   const rm_arcs *arcs = g->arcs;
   company       *list;
@@ -170,7 +172,8 @@ static bool is_without_folds(const grouping *g, const rm_faces *faces, int64_t k
 }
 
 /* Polygons of groups that are no faces join only what is coplanar. */
-static remap_status refuse_groups(rm_arena *passing, const grouping *g, const rm_lid *group_of, const rm_faces *faces, uint8_t *plane_only)
+static remap_status refuse_groups(rm_arena *passing, const grouping *g, const rm_lid *group_of, const rm_faces *faces,
+                                  uint8_t *plane_only)
 {
   uint8_t *bad;
   rm_lid  *loop;
@@ -205,10 +208,11 @@ remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *
   return group_pieces(arena, &g, parent, out);
 }
 
-/* ---- loops ---------------------------------------------------------------------------------------------------------------- */
+/* ---- loops ------------------------------------------------------------------------------------------------------- */
 
 /* Link the sides of all members, from vertex to vertex, and count them; false if two begin at one vertex. */
-static bool link_sides(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t group, rm_lid *sides, rm_lid *first)
+static bool link_sides(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t group, rm_lid *sides,
+                       rm_lid *first)
 {
   bool simple = true;
 

@@ -1,9 +1,9 @@
-/* flat -- a triangulation without flat triangles, whose corners lie on a line, for what bounds volumes exactly: collapsed faces,
- * hanging nodes and singular axes leave such triangles, which in a limit without thickness are not there.
+/* flat -- a triangulation without flat triangles, whose corners lie on a line, for what bounds volumes exactly: collapsed
+ * faces, hanging nodes and singular axes leave such triangles, which in a limit without thickness are not there.
  *
- * A flat triangle has one edge that runs along its other two, over a vertex. Left out, the triangles beyond that edge would no
- * longer meet the others there in common edges: so each of them is cut at all vertices of flat triangles that lie on its edge.
- * What is done to an edge depends on what touches it alone. O(n); O(f log f) for f flat triangles. */
+ * A flat triangle has one edge that runs along its other two, over a vertex. Left out, the triangles beyond that edge would
+ * no longer meet the others there in common edges: so each of them is cut at all vertices of flat triangles that lie on its
+ * edge. What is done to an edge depends on what touches it alone. O(n); O(f log f) for f flat triangles. */
 #include "cells/cells_private.h"
 
 #include <math.h>
@@ -49,7 +49,7 @@ static bool is_inside(const rm_trimesh *m, const rm_lid edge[2], rm_lid v)
   return !rm_off_plane(a, b, p, o);
 }
 
-/* ---- vertices inside edges ---------------------------------------------------------------------------------------------------- */
+/* ---- vertices inside edges --------------------------------------------------------------------------------------- */
 
 typedef struct query {
   work         *w;
@@ -112,14 +112,15 @@ static remap_status find_inner(work *w)
 
     w->inner_offset[e] = (rm_lid)w->num_inner;
     if (edge_at_flat[e])
-      rm_boxtree_query_segment(tree, (const double (*)[6])box, m->vertex[m->edge[e][0]], m->vertex[m->edge[e][1]], take_inner, &q);
+      rm_boxtree_query_segment(tree, (const double(*)[6])box, m->vertex[m->edge[e][0]], m->vertex[m->edge[e][1]], take_inner,
+                               &q);
     RM_TRY(q.status);
   }
   w->inner_offset[m->num_edges] = (rm_lid)w->num_inner;
   return REMAP_OK;
 }
 
-/* ---- triangles ---------------------------------------------------------------------------------------------------------------- */
+/* ---- triangles --------------------------------------------------------------------------------------------------- */
 
 static remap_status push(work *w, rm_lid t, rm_lid a, rm_lid b, rm_lid c)
 {
@@ -130,7 +131,8 @@ static remap_status push(work *w, rm_lid t, rm_lid a, rm_lid b, rm_lid c)
   return REMAP_OK;
 }
 
-/* Side h of triangle t runs from its corner h to the next one; the k-th of its n points from one to the other, ends included. */
+/* Side h of triangle t runs from its corner h to the next one; the k-th of its n points from one to the other, ends
+ * included. */
 static rm_lid num_on_side(const work *w, rm_lid t, int h)
 {
   const rm_lid e = w->m->triangle_edge[t][h];
@@ -138,7 +140,8 @@ static rm_lid num_on_side(const work *w, rm_lid t, int h)
 }
 static rm_lid on_side(const work *w, rm_lid t, int h, rm_lid k)
 {
-  const rm_lid e = w->m->triangle_edge[t][h], n = num_on_side(w, t, h), at = h == 2 ? n - 1 - k : k; /* the third runs backwards */
+  const rm_lid e = w->m->triangle_edge[t][h], n = num_on_side(w, t, h),
+               at = h == 2 ? n - 1 - k : k; /* the third runs backwards */
   return at == 0 ? w->m->edge[e][0] : at == n - 1 ? w->m->edge[e][1] : w->inner[w->inner_offset[e] + at - 1];
 }
 
@@ -149,8 +152,8 @@ static remap_status fan(work *w, rm_lid t, rm_lid p, int h, rm_lid first, rm_lid
   return REMAP_OK;
 }
 
-/* Cut triangle t at the points on its sides: a fan over the first side that has some, whose outer triangles become fans over the other
- * two. The corners run as the sides do. */
+/* Cut triangle t at the points on its sides: a fan over the first side that has some, whose outer triangles become fans over
+ * the other two. The corners run as the sides do. */
 static remap_status cut(work *w, rm_lid t)
 {
   int base = 0;
@@ -166,7 +169,7 @@ static remap_status cut(work *w, rm_lid t)
   return fan(w, t, on_side(w, t, base, n - 2), next, 0, n_next - 1);
 }
 
-/* ---- the new mesh --------------------------------------------------------------------------------------------------------------- */
+/* ---- the new mesh ------------------------------------------------------------------------------------------------ */
 
 /* The triangles that are left as a piece of their own. */
 static remap_status make_piece(const work *w, rm_piece *out)

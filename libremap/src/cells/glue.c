@@ -1,7 +1,7 @@
-/* glue -- cells from polygons: two sides of polygons belong to one cell if they face each other around an edge. Around most edges
- * the labels tell which do, for every label is there twice; around others, where a cell touches itself, the polygons are ordered by
- * exact signs. The shells that result are cells, unless one winds the other way: that is a void in another of its label.
- * O(n log n) for n polygon sides. */
+/* glue -- cells from polygons: two sides of polygons belong to one cell if they face each other around an edge. Around most
+ * edges the labels tell which do, for every label is there twice; around others, where a cell touches itself, the polygons
+ * are ordered by exact signs. The shells that result are cells, unless one winds the other way: that is a void in another of
+ * its label. O(n log n) for n polygon sides. */
 #include "cells/cells_private.h"
 
 #include <math.h>
@@ -30,12 +30,15 @@ static void join(work *w, rm_lid a, rm_lid b)
   else w->parent[a] = b;
 }
 
-static inline rm_label label_of(const work *w, rm_lid side) { return rm_polygon_label(w->l, &w->p->polygon[side / 2], side & 1); }
+static inline rm_label label_of(const work *w, rm_lid side)
+{
+  return rm_polygon_label(w->l, &w->p->polygon[side / 2], side & 1);
+}
 static inline bool same_label(rm_label a, rm_label b) { return a.cell[0] == b.cell[0] && a.cell[1] == b.cell[1]; }
 static inline uint64_t label_key(rm_label a) { return (uint64_t)(uint32_t)(a.cell[0] + 1) << 32 | (uint32_t)(a.cell[1] + 1); }
 static inline bool is_outside(rm_label a) { return a.cell[0] == RM_OUTSIDE && a.cell[1] == RM_OUTSIDE; }
 
-/* ---- around an edge -------------------------------------------------------------------------------------------------- */
+/* ---- around an edge ---------------------------------------------------------------------------------------------- */
 
 /* The left (0) or right (1) side of an arc's polygon. */
 static inline rm_lid side_of(const rm_arc *arc, int h) { return (arc->polygon & ~1) + h; }
@@ -78,7 +81,8 @@ static bool common_edge(const rm_limit *l, rm_lid p, rm_lid q, const double *lin
   return false;
 }
 
-/* A corner of the polygon's triangle on the polygon's side of the line, which runs as the polygon does; NULL if there is none. */
+/* A corner of the polygon's triangle on the polygon's side of the line, which runs as the polygon does; NULL if there is
+ * none. */
 static const double *corner_of(const work *w, const rm_polygon *g, const double a[3], const double b[3])
 {
   const int         side = g->own & 1;
@@ -144,7 +148,7 @@ static remap_status join_sides(work *w)
   return REMAP_OK;
 }
 
-/* ---- shells ------------------------------------------------------------------------------------------------------------ */
+/* ---- shells ------------------------------------------------------------------------------------------------------ */
 
 static inline double largest(const double x[3]) { return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))); }
 
@@ -154,7 +158,8 @@ static inline void between(const rm_limit *l, rm_lid o, rm_lid p, double out[3])
   for (int k = 0; k < 3; k++) out[k] = (l->xyz[p][k] - l->xyz[o][k]) + ((double)l->low[p][k] - (double)l->low[o][k]);
 }
 
-/* Six times the volume of the cone from spot o over a polygon; if noise is not NULL, a bound of its error is added to *noise. */
+/* Six times the volume of the cone from spot o over a polygon; if noise is not NULL, a bound of its error is added to
+ * *noise. */
 static double cone(const work *w, const rm_polygon *g, rm_lid o, double *noise)
 {
   const rm_lid *v = w->p->vertex + g->first;
@@ -166,7 +171,10 @@ static double cone(const work *w, const rm_polygon *g, rm_lid o, double *noise)
     between(w->l, o, v[i], c);
     sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
     const double reach = noise ? fmax(largest(a), fmax(largest(b), largest(c))) : 0;
-    if (noise) *noise += reach * reach * (0x1p-46 * reach + 16 * ((double)w->l->error[v[0]] + (double)w->l->error[v[i - 1]] + (double)w->l->error[v[i]]));
+    if (noise)
+      *noise +=
+          reach * reach *
+          (0x1p-46 * reach + 16 * ((double)w->l->error[v[0]] + (double)w->l->error[v[i - 1]] + (double)w->l->error[v[i]]));
     memcpy(b, c, sizeof b);
   }
   return sum;
@@ -187,7 +195,8 @@ static double solid_angle(const work *w, const rm_polygon *g, const double o[3])
     const double det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) + d[0][1] * (d[1][2] * d[2][0] - d[1][0] * d[2][2]) +
                        d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
     double dot[3];
-    for (int h = 0; h < 3; h++) dot[h] = d[h][0] * d[(h + 1) % 3][0] + d[h][1] * d[(h + 1) % 3][1] + d[h][2] * d[(h + 1) % 3][2];
+    for (int h = 0; h < 3; h++)
+      dot[h] = d[h][0] * d[(h + 1) % 3][0] + d[h][1] * d[(h + 1) % 3][1] + d[h][2] * d[(h + 1) % 3][2];
     sum += 2 * atan2(det, r[0] * r[1] * r[2] + dot[0] * r[2] + dot[1] * r[0] + dot[2] * r[1]);
   }
   return sum;
@@ -236,7 +245,8 @@ static remap_status collect_shells(work *w, shells *s)
   RM_NEW(s->is_void, w->scratch, s->num);
   for (rm_lid k = 0; k < s->num; k++) s->inside[k] = k, s->label[k] = label_of(w, s->first_side[k]);
   for (rm_lid k = 0; k < sides; k++)
-    if (s->of[k] >= 0) s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), NULL);
+    if (s->of[k] >= 0)
+      s->volume[s->of[k]] += (k & 1 ? -1 : 1) / 6. * cone(w, &w->p->polygon[k / 2], origin_of(w, s, s->of[k]), NULL);
   for (rm_lid k = 0; k < s->num; k++) {
     s->is_void[k] = s->volume[k] < 0;
     any           = any || s->is_void[k];
@@ -284,8 +294,8 @@ static double winding(const work *w, const shells *s, rm_lid x, const double p[3
   return angle;
 }
 
-/* The solid shell among list[0..n) around a void: the only one whose box holds a vertex of it, or else the one that winds about that
- * the most. */
+/* The solid shell among list[0..n) around a void: the only one whose box holds a vertex of it, or else the one that winds
+ * about that the most. */
 static rm_lid shell_around(const work *w, const shells *s, rm_lid hollow, const rm_keyed *list, int64_t n)
 {
   const double *p = w->l->xyz[origin_of(w, s, hollow)], at[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};

@@ -1,6 +1,6 @@
-/* holes -- a polygon with holes, or one that meets itself in a vertex, cut into triangles: each hole is joined to the loop around it
- * by a bridge, from right to left, then ears are cut off. All signs are exact, so every triangle has area and no vertex lies inside
- * one or on its sides. O(n^2) for n vertices, expected. */
+/* holes -- a polygon with holes, or one that meets itself in a vertex, cut into triangles: each hole is joined to the loop
+ * around it by a bridge, from right to left, then ears are cut off. All signs are exact, so every triangle has area and no
+ * vertex lies inside one or on its sides. O(n^2) for n vertices, expected. */
 #include "cells/cells_private.h"
 
 #include <string.h>

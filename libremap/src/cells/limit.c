@@ -1,9 +1,10 @@
 /* limit -- where the two meshes touch, found exactly, and the vertices of the supermesh that follow.
  *
- * The overlay finds every crossing of an edge with the inside of a triangle, but thinks mesh 2 moved by an infinitesimal. Three
- * kinds of contacts say all about its limit: vertices of one mesh on triangles of the other, either way, and edges that cross each
- * other inside. A crossing whose edge or triangle takes part in one of them at its place becomes that contact; all others are
- * vertices of their own. Contacts are looked for in the cells that the overlay names: O(n + crossings) times the size of a cell. */
+ * The overlay finds every crossing of an edge with the inside of a triangle, but thinks mesh 2 moved by an infinitesimal.
+ * Three kinds of contacts say all about its limit: vertices of one mesh on triangles of the other, either way, and edges
+ * that cross each other inside. A crossing whose edge or triangle takes part in one of them at its place becomes that
+ * contact; all others are vertices of their own. Contacts are looked for in the cells that the overlay names: O(n +
+ * crossings) times the size of a cell. */
 #include "cells/cells_private.h"
 
 #include <math.h>
@@ -36,7 +37,7 @@ typedef struct builder {
 
 static inline const double *corner(const rm_trimesh *m, rm_lid t, int h) { return m->vertex[m->triangle[t][h]]; }
 
-/* ---- triangles that lie on each other ------------------------------------------------------------------------------ */
+/* ---- triangles that lie on each other ---------------------------------------------------------------------------- */
 
 static remap_status overlapping(const builder *b, int side, rm_lid cell)
 {
@@ -88,10 +89,10 @@ static remap_status join_copies(builder *b, int side)
   return REMAP_OK;
 }
 
-/* ---- contacts ------------------------------------------------------------------------------------------------------- */
+/* ---- contacts ---------------------------------------------------------------------------------------------------- */
 
-/* A feature that a point of cell j, moved by an infinitesimal, lies on is one of that cell; of the skin if it is in no cell. Where a
- * cell is too large to be searched through, a tree over all triangles is, made when first needed. */
+/* A feature that a point of cell j, moved by an infinitesimal, lies on is one of that cell; of the skin if it is in no cell.
+ * Where a cell is too large to be searched through, a tree over all triangles is, made when first needed. */
 enum { LARGE = 256 };
 
 static remap_status need_tree(builder *b, int side)
@@ -268,7 +269,8 @@ static void touch_near(edge_query *q, rm_lid j)
 {
   static const int  low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
   const rm_trimesh *m2     = q->b->l->o->mesh[1];
-  const rm_lid     *vertex = m2->cell_vertex + m2->cell_vertex_offset[j], n = m2->cell_vertex_offset[j + 1] - m2->cell_vertex_offset[j];
+  const rm_lid     *vertex = m2->cell_vertex + m2->cell_vertex_offset[j],
+               n           = m2->cell_vertex_offset[j + 1] - m2->cell_vertex_offset[j];
   unsigned          code[256]; /* places in a cell are bytes */
 
   for (rm_lid k = 0; k < n; k++) code[k] = beyond(q, m2->vertex[vertex[k]]);
@@ -276,7 +278,8 @@ static void touch_near(edge_query *q, rm_lid j)
     const uint8_t *corner = m2->cell_triangle_vertex[k];
     if (code[corner[0]] & code[corner[1]] & code[corner[2]]) continue;
     for (int h = 0; h < 3; h++)
-      if (!(code[corner[low[h]]] & code[corner[high[h]]]) && touch_edge(q, m2->triangle_edge[m2->cell_triangle[k] / 2][h])) return;
+      if (!(code[corner[low[h]]] & code[corner[high[h]]]) && touch_edge(q, m2->triangle_edge[m2->cell_triangle[k] / 2][h]))
+        return;
   }
 }
 
@@ -337,7 +340,7 @@ static remap_status cross_edges(builder *b)
   return REMAP_OK;
 }
 
-/* ---- spots ---------------------------------------------------------------------------------------------------------- */
+/* ---- spots ------------------------------------------------------------------------------------------------------- */
 
 static remap_status push_spot(builder *b, rm_feature at1, rm_feature at2, rm_lid *out)
 {
@@ -448,7 +451,7 @@ static remap_status coordinates(builder *b)
   return REMAP_OK;
 }
 
-/* ---- vertices of the other mesh on edges and in triangles -------------------------------------------------------------- */
+/* ---- vertices of the other mesh on edges and in triangles -------------------------------------------------------- */
 
 static remap_status file_vertices(builder *b, int side)
 {
@@ -479,7 +482,7 @@ static remap_status file_vertices(builder *b, int side)
   return REMAP_OK;
 }
 
-/* ---- lines ------------------------------------------------------------------------------------------------------------ */
+/* ---- lines ------------------------------------------------------------------------------------------------------- */
 
 typedef struct line {
   rm_lid *spot, *state;
@@ -576,7 +579,7 @@ static remap_status lines(builder *b, int side)
   return status;
 }
 
-/* ----------------------------------------------------------------------------------------------------------------------- */
+/* ------------------------------------------------------------------------------------------------------------------ */
 
 static remap_status build(builder *b)
 {

@@ -1,11 +1,12 @@
-/* polygons -- the planar graph in every triangle, made of the vertices along its edges and of its meetings with the other mesh,
- * and the polygons that it bounds.
+/* polygons -- the planar graph in every triangle, made of the vertices along its edges and of its meetings with the other
+ * mesh, and the polygons that it bounds.
  *
- * A triangle meets a triangle of the other mesh, if not in a point, in one segment, and an edge that lies in its plane likewise.
- * These arcs do not cross. Around a vertex they are ordered by exact turns; a walk that keeps to the left then goes around each
- * polygon. In which cell of the other mesh a polygon lies, its arcs tell: the side of the triangle that made them, the state of the
- * edge, or, where an arc runs along an edge of the other mesh, the place among the triangles around that edge. A polygon that lies
- * on a triangle of the other mesh is made once, by mesh 1. O(a log a) for the a arcs of a triangle. */
+ * A triangle meets a triangle of the other mesh, if not in a point, in one segment, and an edge that lies in its plane
+ * likewise. These arcs do not cross. Around a vertex they are ordered by exact turns; a walk that keeps to the left then
+ * goes around each polygon. In which cell of the other mesh a polygon lies, its arcs tell: the side of the triangle that
+ * made them, the state of the edge, or, where an arc runs along an edge of the other mesh, the place among the triangles
+ * around that edge. A polygon that lies on a triangle of the other mesh is made once, by mesh 1. O(a log a) for the a arcs
+ * of a triangle. */
 #include "cells/cells_private.h"
 
 #include <stdlib.h>
@@ -68,12 +69,13 @@ static remap_status tangled(const work *w)
 {
   const rm_lid *cell = w->l->o->mesh[w->side]->side[w->t];
   const rm_lid  c    = cell[0] >= 0 ? cell[0] : cell[1];
-  return rm_fail(REMAP_BAD_MESH, w->reason, w->side, c >= 0 ? w->part->piece[w->side].cell_global[c] : -1,
-                 "a face of this cell meets cells of the other mesh that overlap, or overlaps faces of its own mesh; a supermesh "
-                 "needs cells that do not");
+  return rm_fail(
+      REMAP_BAD_MESH, w->reason, w->side, c >= 0 ? w->part->piece[w->side].cell_global[c] : -1,
+      "a face of this cell meets cells of the other mesh that overlap, or overlaps faces of its own mesh; a supermesh "
+      "needs cells that do not");
 }
 
-/* ---- segments of both sides --------------------------------------------------------------------------------------------- */
+/* ---- segments of both sides -------------------------------------------------------------------------------------- */
 
 static remap_status file_segments(work *w)
 {
@@ -89,10 +91,12 @@ static remap_status file_segments(work *w)
       for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++)
         for (int64_t k = o->end_offset[t]; k < o->end_offset[t + 1]; k += 2) {
           const rm_end *end = &o->end[k];
-          const rm_lid  b = end->other, own = w->l->first_copy[side][side ? b : t], other = w->l->first_copy[1 - side][side ? t : b];
+          const rm_lid  b = end->other, own = w->l->first_copy[side][side ? b : t],
+                       other = w->l->first_copy[1 - side][side ? t : b];
           rm_lid        p[2];
           for (int h = 0; h < 2; h++) p[h] = w->l->crossing_spot[end[h].at >> 1 & 1][end[h].at >> 2];
-          if (p[0] == p[1] || !rm_is_present(w->l, 0, side ? other : own) || !rm_is_present(w->l, 1, side ? own : other)) continue;
+          if (p[0] == p[1] || !rm_is_present(w->l, 0, side ? other : own) || !rm_is_present(w->l, 1, side ? own : other))
+            continue;
           if (pass == 0) offset[own + 2]++;
           else s[offset[own + 1]++] = (segment){other, p[side], p[1 - side]};
         }
@@ -107,7 +111,7 @@ static remap_status file_segments(work *w)
   return REMAP_OK;
 }
 
-/* ---- the graph of one triangle -------------------------------------------------------------------------------------------- */
+/* ---- the graph of one triangle ----------------------------------------------------------------------------------- */
 
 static remap_status node(work *w, rm_lid spot, rm_lid *out)
 {
@@ -182,7 +186,8 @@ static remap_status boundary(work *w)
 
   for (int h = 0; h < 3; h++) {
     const rm_lid  e = m->triangle_edge[w->t][h];
-    const rm_lid *spot = l->line_spot[w->side] + l->line_offset[w->side][e], *state = l->line_state[w->side] + l->line_offset[w->side][e];
+    const rm_lid *spot  = l->line_spot[w->side] + l->line_offset[w->side][e],
+                 *state = l->line_state[w->side] + l->line_offset[w->side][e];
     const rm_lid  n = (rm_lid)(l->line_offset[w->side][e + 1] - l->line_offset[w->side][e]);
 
     for (rm_lid i = 0; i + 1 < n; i++) {
@@ -219,7 +224,7 @@ static remap_status segments(work *w)
   return REMAP_OK;
 }
 
-/* ---- edges of the other mesh in the plane of the triangle --------------------------------------------------------------- */
+/* ---- edges of the other mesh in the plane of the triangle -------------------------------------------------------- */
 
 static remap_status push_touch(work *w, rm_lid spot)
 {
@@ -263,7 +268,8 @@ static remap_status edges_in_plane(work *w)
   qsort(w->touch, (size_t)w->num_touches, sizeof *w->touch, by_edge);
   for (rm_lid k = 0; k + 1 < w->num_touches; k++) {
     const edge_spot a = w->touch[k], b = w->touch[k + 1];
-    if (a.edge != b.edge || both_on_edge(w, w->side, w->t, a.spot, b.spot) || !edge_is_present(w, other_side(w), a.edge)) continue;
+    if (a.edge != b.edge || both_on_edge(w, w->side, w->t, a.spot, b.spot) || !edge_is_present(w, other_side(w), a.edge))
+      continue;
     RM_TRY(push_arc(w, (arc){a.spot, b.spot, RM_UNKNOWN, RM_UNKNOWN}));
   }
   return REMAP_OK;
@@ -277,7 +283,7 @@ static int by_ends(const void *a, const void *b)
   return (x->left > y->left) - (x->left < y->left);
 }
 
-/* ---- around an edge of the other mesh ------------------------------------------------------------------------------------- */
+/* ---- around an edge of the other mesh ---------------------------------------------------------------------------- */
 
 /* A corner of the triangle on the left of the line from a to b in its plane. */
 static const double *corner_left_of(const work *w, const double a[3], const double b[3])
@@ -320,7 +326,8 @@ static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *tri
       return true;
     }
     quarter = s > 0 ? 0 : s == 0 ? 1 : 2;
-    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0))) continue;
+    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0)))
+      continue;
     nearest         = y;
     nearest_quarter = quarter;
     *cell           = w->l->cell[other_side(w)][b][h == 2 ? 1 : 0]; /* the side that is met first, turning about f */
@@ -328,8 +335,8 @@ static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *tri
   return nearest != NULL;
 }
 
-/* What lies left of the arc from p to q, which runs along edge f of the other mesh: the triangle on which the polygon there lies, or
- * the cell. False if there is nothing around f. */
+/* What lies left of the arc from p to q, which runs along edge f of the other mesh: the triangle on which the polygon there
+ * lies, or the cell. False if there is nothing around f. */
 static bool place_left(const work *w, rm_lid p, rm_lid q, rm_lid f, rm_lid *triangle, rm_lid *cell)
 {
   const rm_trimesh *m = w->l->o->mesh[other_side(w)];
@@ -342,8 +349,8 @@ static bool place_left(const work *w, rm_lid p, rm_lid q, rm_lid f, rm_lid *tria
   return x && place_around(w, f, x, triangle, cell);
 }
 
-/* An arc along an edge of the other mesh: the cells beside it. Separates is false where the other mesh only touches the triangle
- * there, with one cell on both sides. */
+/* An arc along an edge of the other mesh: the cells beside it. Separates is false where the other mesh only touches the
+ * triangle there, with one cell on both sides. */
 static remap_status place_arc(work *w, arc *a, bool *separates)
 {
   rm_lid triangle[2] = {-1, -1}, cell[2] = {RM_UNKNOWN, RM_UNKNOWN}, ignored, f;
@@ -374,7 +381,7 @@ static remap_status inner_arcs(work *w)
   return REMAP_OK;
 }
 
-/* ---- walks ------------------------------------------------------------------------------------------------------------------ */
+/* ---- walks ------------------------------------------------------------------------------------------------------- */
 
 static inline rm_lid end_of(const work *w, rm_lid h) { return w->half[h ^ 1].from; }
 
@@ -384,8 +391,8 @@ static bool follows(const work *w, rm_lid x, rm_lid y)
   return rm_turn(&w->view, w->spot[w->half[x].from], w->spot[end_of(w, x)], w->spot[end_of(w, y)]) > 0;
 }
 
-/* Order the halves that leave a node of the boundary counter-clockwise. It has two halves of the boundary, which come first: along
- * it, which is now the first, and back along it, which becomes the last; all others are between. */
+/* Order the halves that leave a node of the boundary counter-clockwise. It has two halves of the boundary, which come first:
+ * along it, which is now the first, and back along it, which becomes the last; all others are between. */
 static void order_at_boundary(const work *w, rm_lid *list, rm_lid n)
 {
   const rm_lid ahead = list[list[0] & 1], back = list[!(list[0] & 1)];
@@ -487,7 +494,7 @@ static remap_status walk_cycles(work *w)
   return REMAP_OK;
 }
 
-/* ---- parts of the graph that hang together, holes ----------------------------------------------------------------------------- */
+/* ---- parts of the graph that hang together, holes ---------------------------------------------------------------- */
 
 static rm_lid root(rm_lid *parent, rm_lid k)
 {
@@ -555,7 +562,7 @@ static remap_status find_holes(work *w, bool *any)
   return REMAP_OK;
 }
 
-/* ---- where a polygon lies in the other mesh -------------------------------------------------------------------------------------- */
+/* ---- where a polygon lies in the other mesh ---------------------------------------------------------------------- */
 
 /* Of a polygon that has no arc with a state: all its arcs lie on triangles of the other mesh. */
 static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *state)
@@ -592,7 +599,7 @@ static bool same_way(const work *w, rm_lid b)
   return rm_orient3d(other->vertex[u[0]], other->vertex[u[1]], other->vertex[u[2]], o) > 0;
 }
 
-/* ---- output ---------------------------------------------------------------------------------------------------------------------- */
+/* ---- output ------------------------------------------------------------------------------------------------------ */
 
 static remap_status push_vertex(rm_polygons *out, rm_lid spot)
 {

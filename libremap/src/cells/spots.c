@@ -1,6 +1,6 @@
-/* spots -- exact signs of vertices of the supermesh. A spot that is no vertex of a mesh is the meeting of a line with a plane, both
- * through points in doubles: rational coordinates, numerators of degree 4 over denominators of degree 3. Doubles with their error
- * bounds decide nearly always (10 ns); integers (exact.h) the rest (a few us). */
+/* spots -- exact signs of vertices of the supermesh. A spot that is no vertex of a mesh is the meeting of a line with a
+ * plane, both through points in doubles: rational coordinates, numerators of degree 4 over denominators of degree 3. Doubles
+ * with their error bounds decide nearly always (10 ns); integers (exact.h) the rest (a few us). */
 #include "cells/cells_private.h"
 
 #include <math.h>
@@ -52,7 +52,8 @@ void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double pl
     case RM_ON_VERTEX: vertex_plane(own, spot->at[side].id, other->vertex[f.id], plane); break;
     case RM_ON_EDGE:
       for (int h = 0; h < 2; h++) memcpy(plane[h], other->vertex[other->edge[f.id][h]], sizeof plane[h]);
-      if (!rm_off_plane(plane[0], plane[1], own->vertex[e[0]], plane[2])) rm_off_plane(plane[0], plane[1], own->vertex[e[1]], plane[2]);
+      if (!rm_off_plane(plane[0], plane[1], own->vertex[e[0]], plane[2]))
+        rm_off_plane(plane[0], plane[1], own->vertex[e[1]], plane[2]);
       break;
     default:
       for (int h = 0; h < 3; h++) memcpy(plane[h], other->vertex[other->triangle[f.id][h]], sizeof plane[h]);
@@ -89,7 +90,7 @@ bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3]
   return true;
 }
 
-/* ---- integers ------------------------------------------------------------------------------------------------------ */
+/* ---- integers ---------------------------------------------------------------------------------------------------- */
 
 /* Coordinates num / den: num at scale degree + 1, den at scale degree. */
 typedef struct rational {
@@ -176,7 +177,7 @@ static __attribute__((noinline)) int exact_compare(const rm_limit *l, const rm_l
   return rm_int_sign(&diff) * rm_int_sign(&r[0].den) * rm_int_sign(&r[1].den);
 }
 
-/* ---- doubles first ------------------------------------------------------------------------------------------------- */
+/* ---- doubles first ----------------------------------------------------------------------------------------------- */
 
 rm_view rm_view_of(const rm_limit *l, int side, rm_lid t)
 {

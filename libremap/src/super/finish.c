@@ -1,6 +1,6 @@
-/* finish -- the soup numbered over all ranks and put in order. Corners are numbered by coordinates, along the curve of Morton keys;
- * vertices by their corners; faces by their vertices, starting from the least one towards the lesser of its neighbours; cells by
- * their least face and the side they are on. Faces that turn out to be one join. O(n). */
+/* finish -- the soup numbered over all ranks and put in order. Corners are numbered by coordinates, along the curve of
+ * Morton keys; vertices by their corners; faces by their vertices, starting from the least one towards the lesser of its
+ * neighbours; cells by their least face and the side they are on. Faces that turn out to be one join. O(n). */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -20,10 +20,11 @@ typedef struct work {
 static remap_status tangled(const work *w)
 {
   return rm_fail(REMAP_BAD_MESH, w->reason, -1, -1,
-                 "parts of the supermesh lie on each other: cells of one mesh overlap or are inverted; a supermesh needs cells that do not");
+                 "parts of the supermesh lie on each other: cells of one mesh overlap or are inverted; a supermesh needs cells "
+                 "that do not");
 }
 
-/* ---- vertices ----------------------------------------------------------------------------------------------------------------- */
+/* ---- vertices ---------------------------------------------------------------------------------------------------- */
 
 /* A word that ascends as the coordinate does. */
 static uint64_t word_of(double x)
@@ -109,7 +110,7 @@ static remap_status do_vertices(work *w, rm_arena *passing)
   return rm_comm_agree_reason(w->job->comm, make_nodes(w, passing, number), w->reason);
 }
 
-/* ---- faces -------------------------------------------------------------------------------------------------------------------- */
+/* ---- faces ------------------------------------------------------------------------------------------------------- */
 
 /* The canonical walk of face f: its first place, and +1 if it runs as the loop does, -1 if against it. */
 static int walk_of(const rm_soup *s, int64_t f, int64_t *at)
@@ -178,7 +179,7 @@ static remap_status join_faces(work *w, rm_arena *passing)
   return REMAP_OK;
 }
 
-/* ---- cells -------------------------------------------------------------------------------------------------------------------- */
+/* ---- cells ------------------------------------------------------------------------------------------------------- */
 
 static remap_status number_cells(work *w, rm_arena *passing)
 {
@@ -240,7 +241,7 @@ static remap_status make_cells(work *w, rm_arena *passing, rm_super *out)
   return REMAP_OK;
 }
 
-/* ---- the faces of the result ---------------------------------------------------------------------------------------------------- */
+/* ---- the faces of the result ------------------------------------------------------------------------------------- */
 
 typedef struct face_arrays {
   int64_t *offset, *global;
@@ -261,8 +262,9 @@ static void write_face(const work *w, int64_t f, face_arrays *to)
   to->owner[f]     = turned ? b : a;
   to->neighbour[f] = turned ? a : b;
   for (int side = 0; side < 2; side++) {
-    const rm_soup_face *z = y && y->from[side] >= 0 && (x->from[side] < 0 || y->from_rank[side] < x->from_rank[side] ||
-                                                        (y->from_rank[side] == x->from_rank[side] && y->from[side] < x->from[side]))
+    const rm_soup_face *z = y && y->from[side] >= 0 &&
+                                    (x->from[side] < 0 || y->from_rank[side] < x->from_rank[side] ||
+                                     (y->from_rank[side] == x->from_rank[side] && y->from[side] < x->from[side]))
                                 ? y
                                 : x;
     to->from[side][f] = z->from[side];
@@ -305,7 +307,7 @@ static remap_status make_faces(work *w)
   return REMAP_OK;
 }
 
-/* ---- cells of other ranks --------------------------------------------------------------------------------------------------------- */
+/* ---- cells of other ranks ---------------------------------------------------------------------------------------- */
 
 /* A face that has one cell on a rank, on its way to the rank that looks after its number. */
 typedef struct half {
@@ -398,7 +400,7 @@ static remap_status find_beyond(work *w, rm_arena *passing)
   return rm_comm_agree(comm, keep_beyond(w, passing, returns[comm->size], face, answers), NULL);
 }
 
-/* --------------------------------------------------------------------------------------------------------------------------------- */
+/* ------------------------------------------------------------------------------------------------------------------ */
 
 /* Run a step with working memory of its own. Collective. */
 static remap_status in_passing(work *w, remap_status (*step)(work *w, rm_arena *passing))

@@ -1,6 +1,6 @@
-/* number -- equal keys of all ranks get one number, in the order of the keys: each rank sorts its own, samples tell where to cut,
- * every key goes to the rank of its interval, is numbered there, and the number comes back. Words are sorted one after the other,
- * and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
+/* number -- equal keys of all ranks get one number, in the order of the keys: each rank sorts its own, samples tell where to
+ * cut, every key goes to the rank of its interval, is numbered there, and the number comes back. Words are sorted one after
+ * the other, and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -113,7 +113,8 @@ static remap_status cut(rm_arena *passing, const rm_comm *comm, int words, uint6
 
     while (num && low < high) {
       const int64_t middle = (low + high) / 2;
-      if (compare(d->distinct + middle * words, sample + k.order[num * r / comm->size].item * words, words) < 0) low = middle + 1;
+      if (compare(d->distinct + middle * words, sample + k.order[num * r / comm->size].item * words, words) < 0)
+        low = middle + 1;
       else high = middle;
     }
     d->send_offset[r] = low;

@@ -1,6 +1,6 @@
-/* pass -- cells that meet nothing of the other mesh become cells of the supermesh as they were given. A face between one of them and
- * a cell that meets something is made by whoever makes that other cell, triangulated as it is there, and sent home: so both sides
- * have the same. O(n); 40 bytes and the vertices for each face that is sent. */
+/* pass -- cells that meet nothing of the other mesh become cells of the supermesh as they were given. A face between one of
+ * them and a cell that meets something is made by whoever makes that other cell, triangulated as it is there, and sent home:
+ * so both sides have the same. O(n); 40 bytes and the vertices for each face that is sent. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -48,7 +48,7 @@ static remap_status add_cells(work *w)
   return REMAP_OK;
 }
 
-/* ---- faces between cells that are made and cells that pass ------------------------------------------------------------------ */
+/* ---- faces between cells that are made and cells that pass ------------------------------------------------------- */
 
 /* The passing cell behind face f of what was made; -1 if there is none. */
 static rm_lid cell_behind(const work *w, rm_lid f, int *side)
@@ -151,7 +151,7 @@ static remap_status exchange(work *w)
   return rm_comm_agree(comm, add_arrived(w, p.face_arrives[comm->size], face, xyz), NULL);
 }
 
-/* ---- faces between cells that pass, and of the skin --------------------------------------------------------------------------- */
+/* ---- faces between cells that pass, and of the skin -------------------------------------------------------------- */
 
 static remap_status add_faces(work *w, int side)
 {
@@ -204,12 +204,12 @@ remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, co
     }
     nodes += corners < m->num_nodes ? corners : m->num_nodes;
   }
-  return rm_soup_reserve(soup, cells->num_vertices + nodes, cells->num_faces + faces, cells->face_offset[cells->num_faces] + corners,
-                         cells->num_cells + passing);
+  return rm_soup_reserve(soup, cells->num_vertices + nodes, cells->num_faces + faces,
+                         cells->face_offset[cells->num_faces] + corners, cells->num_cells + passing);
 }
 
-remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
-                           rm_soup *soup)
+remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2],
+                           const rm_cells *cells, rm_soup *soup)
 {
   work         w = {.scratch = rm_arena_new(), .job = job, .cover = cover, .trimesh = mesh, .cells = cells, .soup = soup};
   remap_status status;

@@ -1,6 +1,6 @@
-/* regular -- can cells that meet nothing stay as they were given? Not where what is made beside them differs from the given faces: where
- * a face of theirs lies on other faces of its mesh, as cells pinched to no thickness have it, or where triangles without area were
- * left out, whose vertices the made cells have on their edges. O(n). */
+/* regular -- can cells that meet nothing stay as they were given? Not where what is made beside them differs from the given
+ * faces: where a face of theirs lies on other faces of its mesh, as cells pinched to no thickness have it, or where
+ * triangles without area were left out, whose vertices the made cells have on their edges. O(n). */
 #include "super/super_private.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
-/* soup -- what this rank has made, before it is numbered: an array of vertices, of faces and of cells, to which things are added.
- * O(n). */
+/* soup -- what this rank has made, before it is numbered: an array of vertices, of faces and of cells, to which things are
+ * added. O(n). */
 #include "super/super_private.h"
 
 #include <stdlib.h>
@@ -83,10 +83,11 @@ remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell)
   return REMAP_OK;
 }
 
-/* ---- what room cells made -------------------------------------------------------------------------------------------------- */
+/* ---- what room cells made ---------------------------------------------------------------------------------------- */
 
 /* The corner that vertex v of mesh `side` is; made when first met. */
-static remap_status corner_of(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2], int side, rm_lid v, rm_lid *out)
+static remap_status corner_of(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2], int side,
+                              rm_lid v, rm_lid *out)
 {
   rm_lid *c = &corner_of_vertex[side][v];
 
@@ -96,7 +97,8 @@ static remap_status corner_of(rm_soup *soup, const rm_trimesh *const mesh[2], rm
 }
 
 /* Corners of what the vertex is made of; features of two meshes in an order that does not depend on which mesh is the first. */
-static remap_status add_spot(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2], const rm_spot *spot, const double xyz[3])
+static remap_status add_spot(rm_soup *soup, const rm_trimesh *const mesh[2], rm_lid *const corner_of_vertex[2],
+                             const rm_spot *spot, const double xyz[3])
 {
   rm_soup_vertex v = {{xyz[0], xyz[1], xyz[2]}, {-1, -1, -1, -1, -1}, 0};
   int            n = 0, first = spot->at[0].kind == RM_ON_EDGE ? 0 : 1;
@@ -156,14 +158,15 @@ static void origin_of(const rm_part *part, const rm_trimesh *const mesh[2], int 
     if (f < 0) continue;
     const int    rank = p->cell_home_rank[p->face_cell[f][0]];
     const rm_lid home = p->face_home[f];
-    if (out->from[side] >= 0 && (out->from_rank[side] < rank || (out->from_rank[side] == rank && out->from[side] <= home))) continue;
+    if (out->from[side] >= 0 && (out->from_rank[side] < rank || (out->from_rank[side] == rank && out->from[side] <= home)))
+      continue;
     out->from[side]      = home;
     out->from_rank[side] = rank;
   }
 }
 
-static remap_status add_face(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells, rm_lid f, rm_lid first_vertex,
-                             rm_lid first_cell)
+static remap_status add_face(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells,
+                             rm_lid f, rm_lid first_vertex, rm_lid first_cell)
 {
   const rm_lid *cell = cells->face_cell[f];
   rm_soup_face  face = {0, {first_cell + cell[0], cell[1] < 0 ? -1 : first_cell + cell[1]}, {-1, -1}, {-1, -1}};

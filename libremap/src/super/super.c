@@ -1,5 +1,5 @@
-/* super -- the stages in order: cover, triangulation, crossings, cells, cells that pass, numbers. Where what was made does not fit cells
- * that would pass, which is rare, the first four are done again for all cells. */
+/* super -- the stages in order: cover, triangulation, crossings, cells, cells that pass, numbers. Where what was made does
+ * not fit cells that would pass, which is rare, the first four are done again for all cells. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -59,8 +59,11 @@ static remap_status cover(work *w, const bool all[2], rm_reason *reason)
 static remap_status make_cells(work *w, bool *regular, rm_reason *reason)
 {
   const remap_supermesh_options *options = w->job->options;
-  const rm_cells_choice choice = {options->keep, w->cover->owner, {w->cover->flag[0], w->cover->flag[1]}, options->aggregate != 0,
-                                  options->split_concave != 0};
+  const rm_cells_choice          choice  = {options->keep,
+                                            w->cover->owner,
+                                            {w->cover->flag[0], w->cover->flag[1]},
+                                            options->aggregate != 0,
+                                            options->split_concave != 0};
   const rm_trimesh     *given[2];
   const rm_overlay     *overlay = NULL;
   double                start   = rm_seconds();

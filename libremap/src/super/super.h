@@ -1,10 +1,11 @@
-/* super -- the supermesh over all ranks: two meshes in; out each rank's share of the cells of the supermesh, with numbers that
- * depend on coordinates alone.
+/* super -- the supermesh over all ranks: two meshes in; out each rank's share of the cells of the supermesh, with numbers
+ * that depend on coordinates alone.
  *
- * Every rank takes a core of cells that meet the other mesh, with all that touches them (rm_part_cover), overlays, and keeps the
- * supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are made of and
- * not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and numbered in one order.
- * O(n log n) time; on top of what room cells needs, some 400 bytes for each cell of the result while it is numbered. */
+ * Every rank takes a core of cells that meet the other mesh, with all that touches them (rm_part_cover), overlays, and keeps
+ * the supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are
+ * made of and not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and
+ * numbered in one order. O(n log n) time; on top of what room cells needs, some 400 bytes for each cell of the result while
+ * it is numbered. */
 #ifndef RM_SUPER_H
 #define RM_SUPER_H
 

@@ -66,25 +66,25 @@ static inline bool rm_super_passes(const rm_super_job *job, int side)
   return job->options->pass_through && (job->options->keep & (side ? REMAP_IN_TARGET : REMAP_IN_SOURCE));
 }
 
-/* *regular is false if what was made does not fit cells that pass, which then have to be made too. given: the meshes as they were
- * triangulated; mesh: as they were overlaid. Not collective. */
+/* *regular is false if what was made does not fit cells that pass, which then have to be made too. given: the meshes as they
+ * were triangulated; mesh: as they were overlaid. Not collective. */
 remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const given[2],
                                  const rm_trimesh *const mesh[2], const rm_cells *cells, bool *regular);
 
 /* Room for what rm_super_pass adds, about. Not collective. */
 remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup);
-/* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which are
- * behind faces of `cells`, home, and add those that come. Collective. */
-remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2], const rm_cells *cells,
-                           rm_soup *soup);
+/* Add the cells of this rank that meet nothing, of the meshes that keep names; send the faces between them and others, which
+ * are behind faces of `cells`, home, and add those that come. Collective. */
+remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2],
+                           const rm_cells *cells, rm_soup *soup);
 
 /* Number n keys of `words` words each, key[n][words], over all ranks: equal keys get one number, from 0 without gaps, in the
  * lexicographical order of the keys. number is [n]. Collective. Working memory from passing. O(n) for n keys mostly. */
 remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
                              int64_t *total);
 
-/* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. BAD_MESH if vertices of it that are not
- * the same lie in one place, or more than two faces. */
+/* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. BAD_MESH if vertices of it that
+ * are not the same lie in one place, or more than two faces. */
 remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *soup, rm_super *out, rm_reason *reason);
 
 #endif
