@@ -1,5 +1,5 @@
-/* sids_gas -- the ideal gas that a file was computed with, from its FlowEquationSet_t or ReferenceState_t. The tree alone says it,
- * alike on all ranks. */
+/* sids_gas -- the ideal gas that a file was computed with, from its FlowEquationSet_t or ReferenceState_t. The tree alone says
+ * it, alike on all ranks. */
 #include "cgns_private.h"
 
 #include <math.h>

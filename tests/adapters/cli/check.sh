@@ -34,10 +34,10 @@ hold "$wrong" "identical meshes are exact"
 works 1 --check masked.cgns mesh.cgns --source-mask Iblank --limiter none
 hold $? "masks count"
 
-fails 2 4 "good.cgns.*mesh.cgns.*order" good.cgns mesh.cgns --check --order 3 --report report.json
+fails 2 4 "wide.cgns.*half.cgns.*order" wide.cgns half.cgns --check --report report.json
 grep -q "^order .*FAIL$" stdout || complain "no FAIL"
 [ "$(value check 2 pass)" = false ] || complain "the report does not tell"
-hold "$wrong" "cells too few for order 3 fail with status 4"
+hold "$wrong" "cells too wide for the order fail with status 4"
 fails 1 3 "do not meet" good.cgns far.cgns --check
 hold $? "meshes that do not meet are told apart"
 fails 1 2 "leave -o" good.cgns mesh.cgns --check -o out/result.cgns
