@@ -220,17 +220,18 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   return REMAP_OK;
 }
 
-/* The end of the copies of triangle i; *joined if they are two on opposite sides. */
+/* The end of the copies of triangle i; *joined if they are two on opposite sides, of two cells. Those of one cell stay apart: they
+ * would have to where a third copy is there too, which another rank need not have, and sums must not depend on that. */
 static inline int64_t copies_end(const corner_triple *triple, int64_t i, int64_t num, bool *joined)
 {
   int64_t k = i + 1;
 
   while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
-  *joined = k == i + 2 && triple[i].right != triple[i + 1].right;
+  *joined = k == i + 2 && triple[i].right != triple[i + 1].right && triple[i].cell != triple[i + 1].cell;
   return k;
 }
 
-/* Join the two copies of a triangle that lie on opposite sides; any other number of copies stays apart, each a skin. */
+/* Join two cells' copies of a triangle that lie on opposite sides; any other copies stay apart, each a skin. */
 static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
 {
   rm_lid (*triangle)[3], (*side)[2], (*face)[2];

@@ -78,6 +78,9 @@ static bool normal_is_right(const rm_trimesh *m, rm_lid t)
   return true;
 }
 
+/* The cell of a triangle that has one side. */
+static rm_lid only_cell(const rm_lid side[2]) { return side[side[0] == RM_OUTSIDE]; }
+
 /* Copies of one triangle stand side by side, are no two that would have joined, and have one side each. */
 static bool triangles_are_right(const rm_trimesh *m)
 {
@@ -94,7 +97,8 @@ static bool triangles_are_right(const rm_trimesh *m)
     if (!one_sided || (m->side[t - 1][0] != RM_OUTSIDE && m->side[t - 1][1] != RM_OUTSIDE)) return false;
     const bool alone = (t < 2 || compare_lids(m->triangle[t - 2], v, 3)) &&
                        (t + 1 == m->num_triangles || compare_lids(m->triangle[t + 1], v, 3));
-    if (alone && (side[0] == RM_OUTSIDE) != (m->side[t - 1][0] == RM_OUTSIDE)) return false;
+    const bool opposite = (side[0] == RM_OUTSIDE) != (m->side[t - 1][0] == RM_OUTSIDE);
+    if (alone && opposite && only_cell(side) != only_cell(m->side[t - 1])) return false;
   }
   return true;
 }
