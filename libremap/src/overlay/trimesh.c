@@ -220,8 +220,8 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   return REMAP_OK;
 }
 
-/* The end of the copies of triangle i; *joined if they are two on opposite sides, of two cells. Those of one cell stay apart: they
- * would have to where a third copy is there too, which another rank need not have, and sums must not depend on that. */
+/* The end of the copies of triangle i; *joined if they are two on opposite sides, of two cells. Those of one cell stay apart:
+ * they would where a third copy is there too, which another rank need not have, and sums must not depend on that. */
 static inline int64_t copies_end(const corner_triple *triple, int64_t i, int64_t num, bool *joined)
 {
   int64_t k = i + 1;
