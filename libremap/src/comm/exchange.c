@@ -97,50 +97,64 @@ remap_status rm_comm_exchange(const rm_comm *comm, rm_arena *arena, size_t size,
   return rm_comm_exchange_chunked(comm, RM_COMM_CHUNK, arena, size, send_offset, send, recv_offset, recv);
 }
 
-/* Ranks with items, ascending, into rank[]; offset [num_ranks + 1] shrinks to one entry per such rank and one more. */
-static int keep_neighbours(int num_ranks, int64_t *offset, int *rank)
+/* The ranks with items, ascending, and the offsets of their items and of the end: [*num] and [*num + 1] in arena, however many
+ * ranks there are. Not collective. */
+static remap_status keep_neighbours(rm_arena *arena, int num_ranks, const int64_t *offset, int *num, const int **rank,
+                                    const int64_t **kept)
 {
-  int num = 0;
+  int     *own_rank, n = 0;
+  int64_t *own_offset;
 
+  for (int r = 0; r < num_ranks; r++) n += offset[r] < offset[r + 1];
+  RM_NEW(own_rank, arena, n);
+  RM_NEW(own_offset, arena, (int64_t)n + 1);
+  *num = n;
+  n    = 0;
   for (int r = 0; r < num_ranks; r++) {
     if (offset[r] == offset[r + 1]) continue;
-    rank[num]     = r;
-    offset[num++] = offset[r]; /* never ahead of what is read: num <= r */
+    own_rank[n]     = r;
+    own_offset[n++] = offset[r];
   }
-  offset[num] = offset[num_ranks];
-  return num;
+  own_offset[n] = offset[num_ranks];
+  *rank         = own_rank;
+  *kept         = own_offset;
+  return REMAP_OK;
+}
+
+/* The plan out of how much is wanted of each rank, and by each. Not collective. */
+static remap_status shorten(rm_arena *arena, int num_ranks, const int64_t *recv_offset, const int64_t *send_offset, rm_plan *plan)
+{
+  RM_TRY(keep_neighbours(arena, num_ranks, recv_offset, &plan->num_recv, &plan->recv_rank, &plan->recv_offset));
+  RM_TRY(keep_neighbours(arena, num_ranks, send_offset, &plan->num_send, &plan->send_rank, &plan->send_offset));
+  RM_NEW(plan->request, arena, (int64_t)plan->num_send + plan->num_recv);
+  return REMAP_OK;
 }
 
 remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank,
                            const rm_lid *want_item, const rm_plan **out)
 {
-  rm_plan   *plan        = rm_arena_zero(arena, 1, sizeof *plan);
-  int64_t   *recv_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *recv_offset);
-  int64_t   *send_offset = rm_arena_zero(arena, (int64_t)comm->size + 1, sizeof *send_offset);
-  int       *send_rank   = rm_arena_alloc(arena, comm->size, sizeof *send_rank);
-  int       *recv_rank   = rm_arena_alloc(arena, comm->size, sizeof *recv_rank);
-  void      *asked       = NULL;
-  const bool have        = plan && recv_offset && send_offset && send_rank && recv_rank;
+  rm_arena    *scratch     = rm_arena_new();
+  rm_plan     *plan        = rm_arena_zero(arena, 1, sizeof *plan);
+  int64_t     *recv_offset = scratch ? rm_arena_zero(scratch, (int64_t)comm->size + 1, sizeof *recv_offset) : NULL;
+  int64_t     *send_offset = scratch ? rm_arena_zero(scratch, (int64_t)comm->size + 1, sizeof *send_offset) : NULL;
+  void        *asked       = NULL;
+  remap_status status;
 
-  RM_TRY(rm_comm_agree(comm, have ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_comm_agree(comm, plan && recv_offset && send_offset ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(plan && recv_offset && send_offset);
   for (int64_t k = 0; k < num_want; k++) {
     RM_ASSERT(want_rank[k] >= 0 && want_rank[k] < comm->size && (k == 0 || want_rank[k - 1] <= want_rank[k]));
     recv_offset[want_rank[k]]++;
   }
   rm_offsets(recv_offset, comm->size);
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *want_item, recv_offset, want_item, send_offset, &asked));
-
-  plan->num_recv    = keep_neighbours(comm->size, recv_offset, recv_rank);
-  plan->num_send    = keep_neighbours(comm->size, send_offset, send_rank);
-  plan->recv_rank   = recv_rank;
-  plan->send_rank   = send_rank;
-  plan->recv_offset = recv_offset;
-  plan->send_offset = send_offset;
-  plan->send_item   = asked;
-  plan->request     = rm_arena_alloc(arena, (int64_t)plan->num_send + plan->num_recv, sizeof *plan->request);
-  RM_TRY(rm_comm_agree(comm, plan->request ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_comm_exchange(comm, arena, sizeof *want_item, recv_offset, want_item, send_offset, &asked));
+  plan->send_item = asked;
+  status          = shorten(arena, comm->size, recv_offset, send_offset, plan);
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   *out = plan;
-  return REMAP_OK;
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
 /* The items to send, gathered in the plan's order. */
