@@ -2,9 +2,9 @@
  *
  *   ./make_demo DIR [N]
  *
- * Both fill the unit cube with warped cells. DIR/source.cgns: two blocks of hexahedra, N cells along each axis of the cube, with a
- * smooth flow in FlowSolution. DIR/target.cgns: a block of hexahedra below, prisms on octagons and squares above (NGON_n and
- * NFACE_n), neither aligned with the source; the faces of the two meet in a plane but do not match. N is 24 by default. */
+ * Both fill the unit cube with warped cells. DIR/source.cgns: two blocks of hexahedra, N cells along each axis of the cube,
+ * with a smooth flow in FlowSolution. DIR/target.cgns: a block of hexahedra below, prisms on octagons and squares above (NGON_n
+ * and NFACE_n), neither aligned with the source; the faces of the two meet in a plane but do not match. N is 24 by default. */
 #include <cgns.h>
 
 #include <errno.h>

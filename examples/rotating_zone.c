@@ -1,10 +1,11 @@
-/* rotating_zone -- libremap in an overset solver: a ring of cells rotates within a box of cells, both distributed over all ranks.
+/* rotating_zone -- libremap in an overset solver: a ring of cells rotates within a box of cells. Both are
+ * distributed over all ranks.
  *
  *   mpirun -n 2 ./rotating_zone
  *
- * In every step the ring moves, and cells take their roles: the ring's innermost, outermost, lowest and highest cells (its fringe) want
- * values of the box; those of the box that the rest of the ring covers wholly (the hole) want values of the ring; all others
- * give. Both transfers run at once. The field is linear, so that what arrives is known. */
+ * In every step the ring moves, and cells take their roles: the ring's innermost, outermost, lowest and highest cells (its
+ * fringe) want values of the box; those of the box that the rest of the ring covers wholly (the hole) want values of the ring;
+ * all others give. Both transfers run at once. The field is linear, so that what arrives is known. */
 #include <remap/remap.h>
 
 #include <math.h>
@@ -72,7 +73,8 @@ static void add_face(zone *z, int d, const int at[3])
 }
 
 /* This rank's share of the layers of a zone of n[0] * n[1] * n[2] cells. */
-static int make_zone(zone *z, const int n[3], void (*place)(const int n[3], const int at[3], double xyz[3]), int rank, int num_ranks)
+static int make_zone(zone *z, const int n[3], void (*place)(const int n[3], const int at[3], double xyz[3]), int rank,
+                     int num_ranks)
 {
   const int     first = n[2] * rank / num_ranks, last = n[2] * (rank + 1) / num_ranks, layers = last - first;
   const int64_t num_nodes = (int64_t)(n[0] + 1) * (n[1] + 1) * (layers + 1), num_cells = (int64_t)n[0] * n[1] * layers;
@@ -88,13 +90,14 @@ static int make_zone(zone *z, const int n[3], void (*place)(const int n[3], cons
   z->wants          = malloc((size_t)num_cells + 1);
   z->centroid       = malloc(((size_t)num_cells + 1) * 3 * sizeof *z->centroid);
   z->density        = malloc(((size_t)num_cells + 1) * sizeof *z->density);
-  if (!z->xyz || !z->face_offset || !z->face_node || !z->face_owner || !z->face_neighbour || !z->gives || !z->wants || !z->centroid ||
-      !z->density)
+  if (!z->xyz || !z->face_offset || !z->face_node || !z->face_owner || !z->face_neighbour || !z->gives || !z->wants ||
+      !z->centroid || !z->density)
     return 0;
 
   for (int k = first; k <= last; k++)
     for (int j = 0; j <= n[1]; j++)
-      for (int i = 0; i <= n[0]; i++) place(n, (const int[3]){i, j, k}, z->xyz + 3 * node_at(z, (const int[3]){i, j, k - first}));
+      for (int i = 0; i <= n[0]; i++)
+        place(n, (const int[3]){i, j, k}, z->xyz + 3 * node_at(z, (const int[3]){i, j, k - first}));
   z->face_offset[0] = 0;
   for (int d = 0; d < 3 && layers > 0; d++)
     for (int k = 0; k < layers + (d == 2); k++)
@@ -176,7 +179,7 @@ static remap_status step(remap_context *ctx, zone zones[2], double angle, outcom
   const double       c = cos(angle), s = sin(angle), half = .5;
   const double       turn[12]  = {c, -s, 0, half - c * half + s * half, s, c, 0, half - s * half - c * half, 0, 0, 1, 0};
   const remap_motion motion[2] = {{NULL, NULL}, {NULL, turn}};
-  const remap_masks  masks     = {.gives = {zones[BOX].gives, zones[RING].gives}, .wants = {zones[BOX].wants, zones[RING].wants}};
+  const remap_masks  masks = {.gives = {zones[BOX].gives, zones[RING].gives}, .wants = {zones[BOX].wants, zones[RING].wants}};
   remap_field_desc   field[2];
   remap_transfer     how;
   remap_status       status;
@@ -249,7 +252,8 @@ int main(int argc, char **argv)
     ok = ok && out.wanting[BOX] > 0 && out.orphans[BOX] == 0 && out.orphans[RING] == 0 && out.error < 1e-11 &&
          report[0].conservation_error < 1e-14 && report[1].conservation_error < 1e-14;
   }
-  if (rank == 0 && status != REMAP_OK) fprintf(stderr, "rotating_zone: %s: %s\n", remap_status_text(status), remap_message(ctx));
+  if (rank == 0 && status != REMAP_OK)
+    fprintf(stderr, "rotating_zone: %s: %s\n", remap_status_text(status), remap_message(ctx));
 
   remap_destroy(&ctx);
   free_zone(&zones[BOX]);

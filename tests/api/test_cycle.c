@@ -1,4 +1,5 @@
-/* A mesh that moves there and back: what a hundred transfers make of content and shape. 12^3 cells, with REMAP_LONG_TESTS 16^3 too. */
+/* A mesh that moves there and back: what a hundred transfers make of content and shape. 12^3 cells, with REMAP_LONG_TESTS 16^3
+ * too. */
 #include "carried.h"
 
 /* The mesh moves as its warp swings once, in a hundred steps, and all fields are carried from each position to the next. */

@@ -4,7 +4,7 @@
 #include "meshes.h"
 #include "rt.h"
 
-/* ---- memory: the library's requests come here by the linker's --wrap ------------------------------------------------------ */
+/* ---- memory: the library's requests come here by the linker's --wrap ----------------------------------------------------- */
 
 static long left = -1; /* requests until one fails, -1: none does */
 static bool is_out(void) { return left >= 0 && left-- == 0; }

@@ -48,7 +48,8 @@ typedef struct world {
 static tm_mesh *make(int side)
 {
   static const double away[12] = {1, 0, 0, .25, 0, 1, 0, .2, 0, 0, 1, .3};
-  tm_mesh *m = side ? tm_mixed((int[]){4, 4, 5}, tm_warp, &(tm_warping){0.02, 0.1}) : tm_hexahedra((int[]){5, 4, 4}, tm_warp, &(tm_warping){0.03, 0.7});
+  tm_mesh *m = side ? tm_mixed((int[]){4, 4, 5}, tm_warp, &(tm_warping){0.02, 0.1})
+                    : tm_hexahedra((int[]){5, 4, 4}, tm_warp, &(tm_warping){0.03, 0.7});
 
   if (side) tm_move(m, tm_affine, away);
   return m;
@@ -215,7 +216,8 @@ static void many_small_steps_make_the_bits_of_fresh_builds(void)
     const remap_motion motion[2] = {{NULL, side ? NULL : where[0]}, {NULL, side ? where[1] : NULL}};
     world              fresh;
 
-    memcpy(where[side], (const double[12]){c, -s, 0, .5 - .5 * c + .5 * s, s, c, 0, .5 - .5 * s - .5 * c, 0, 0, 1, .005 * step}, sizeof where[side]);
+    memcpy(where[side], (const double[12]){c, -s, 0, .5 - .5 * c + .5 * s, s, c, 0, .5 - .5 * s - .5 * c, 0, 0, 1, .005 * step},
+           sizeof where[side]);
     RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
     if (step % 3 == 1) continue;
     open_world(&fresh, (const double(*)[12])where, 11);
@@ -240,7 +242,8 @@ static double *shaken(const world *w, int side, uint64_t seed, double by)
       memcpy(&bits, &w->mine[side]->xyz[3 * i + k], sizeof bits);
       state = tm_mix_(state ^ bits);
     }
-    for (int k = 0; k < 3; k++) xyz[3 * i + k] = w->mine[side]->xyz[3 * i + k] + by * ((double)tm_random(&state, 2001) / 1000 - 1);
+    for (int k = 0; k < 3; k++)
+      xyz[3 * i + k] = w->mine[side]->xyz[3 * i + k] + by * ((double)tm_random(&state, 2001) / 1000 - 1);
   }
   return xyz;
 }

@@ -1,5 +1,5 @@
-/* Order 3 through the public interface: quadratic fields are exact, content is kept, bits do not depend on ranks, and cells with
- * too few neighbours are told. */
+/* Order 3 through the public interface: quadratic fields are exact, content is kept, bits do not depend on ranks, and cells
+ * with too few neighbours are told. */
 #include "carried.h"
 
 /* Two meshes that stay the caller's, and the means of one field on both. */
@@ -87,8 +87,8 @@ static void partly_covered_cells_take_the_whole_polynomial(void)
   }
 }
 
-/* Moved, a quadratic field is of another size. In turned pancakes six numbers of a symmetric matrix hold a part that is 10^8 times
- * smaller than they are. */
+/* Moved, a quadratic field is of another size. In turned pancakes six numbers of a symmetric matrix hold a part that is 10^8
+ * times smaller than they are. */
 static void far_stretched_and_turned_meshes_are_no_worse(void)
 {
   static const double size[] = {1e-3, 1, 1, 1}, shift[] = {0, 1e4, 0, 0}, thin[] = {1, 1, 1e-4, 1e-4}, angle[] = {0, 0, 0, 0.4};

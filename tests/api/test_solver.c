@@ -50,7 +50,8 @@ int MPI_Allgather(const void *in, int n, MPI_Datatype type, void *out, int m, MP
   calls.collective++;
   return PMPI_Allgather(in, n, type, out, m, to, comm);
 }
-int MPI_Allgatherv(const void *in, int n, MPI_Datatype type, void *out, const int *m, const int *at, MPI_Datatype to, MPI_Comm comm)
+int MPI_Allgatherv(const void *in, int n, MPI_Datatype type, void *out, const int *m, const int *at, MPI_Datatype to,
+                   MPI_Comm comm)
 {
   calls.collective++;
   return PMPI_Allgatherv(in, n, type, out, m, at, to, comm);
@@ -351,7 +352,8 @@ static void strides_and_places_leave_the_rest_alone(void)
     }
     if (rt_all(RT_EQ(remap_build(w.ctx), REMAP_OK))) {
       const remap_transfer   how = nearest();
-      const remap_field_desc f   = {.nature = REMAP_CONSERVED, .in = q[0] + 1, .out = q[1] + 2, .in_stride = NVAR, .out_stride = NVAR};
+      const remap_field_desc f   = {.nature = REMAP_CONSERVED, .in = q[0] + 1, .out = q[1] + 2,
+                                    .in_stride = NVAR, .out_stride = NVAR};
 
       RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
       for (int64_t c = 0; c < w.cells[1]; c++) {
@@ -474,7 +476,8 @@ static void masked_cells_are_as_good_as_not_there(void)
 
     for (int side = 0; side < 2; side++) {
       mask[side] = tm_alloc_(w.cells[side], 1), cover[side] = tm_alloc_(w.cells[1], sizeof(remap_cover));
-      for (int64_t c = 0; c < w.cells[side]; c++) mask[side][c] = side ? wants(w.mine[1]->global[c]) : gives(w.mine[0]->global[c]);
+      for (int64_t c = 0; c < w.cells[side]; c++)
+        mask[side][c] = side ? wants(w.mine[1]->global[c]) : gives(w.mine[0]->global[c]);
     }
     for (int64_t c = 0; c < w.cells[0]; c++)
       if (!mask[0][c]) w.u[0][c] = NAN; /* nobody looks */
@@ -630,11 +633,12 @@ static void contexts_do_not_know_of_each_other(void)
 }
 
 RT_MAIN(RT_CASE(halves_make_the_same_as_a_whole_in_both_directions_at_once),
-        RT_CASE(halves_out_of_order_are_refused_and_a_context_may_end_between_them), RT_CASE(transfers_after_the_first_take_no_memory),
-        RT_CASE(transfers_after_the_first_are_exchanges_with_neighbours),
+        RT_CASE(halves_out_of_order_are_refused_and_a_context_may_end_between_them),
+        RT_CASE(transfers_after_the_first_take_no_memory), RT_CASE(transfers_after_the_first_are_exchanges_with_neighbours),
         RT_CASE(what_fails_on_one_rank_reaches_its_neighbours_and_all_by_agreement),
         RT_CASE(a_first_transfer_that_one_rank_gets_wrong_fails_on_all),
-        RT_CASE(transfers_that_differ_between_ranks_are_refused_where_they_meet), RT_CASE(strides_and_places_leave_the_rest_alone),
+        RT_CASE(transfers_that_differ_between_ranks_are_refused_where_they_meet),
+        RT_CASE(strides_and_places_leave_the_rest_alone),
         RT_CASE(blocks_with_indices_of_any_kind_make_the_same_bits_as_one_mesh), RT_CASE(masked_cells_are_as_good_as_not_there),
         RT_CASE(meshes_on_ranks_of_their_own_make_the_same_bits), RT_CASE(pairs_and_their_owners_are_enough_for_a_transfer),
         RT_CASE(contexts_do_not_know_of_each_other))

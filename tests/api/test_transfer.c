@@ -18,7 +18,9 @@ static const struct {
   const char *name;
   maker      *make;
   int         n;
-} kinds[] = {{"hexahedra", hexahedra, 6}, {"tetrahedra", tetrahedra, 4}, {"mixed", mixed, 6}, {"hanging nodes", hanging, 4}, {"dual", dual, 4}, {"boxes", boxes, 5}};
+} kinds[] = {{"hexahedra", hexahedra, 6}, {"tetrahedra", tetrahedra, 4},
+             {"mixed", mixed, 6},         {"hanging nodes", hanging, 4},
+             {"dual", dual, 4},           {"boxes", boxes, 5}};
 enum { NUM_KINDS = sizeof kinds / sizeof *kinds };
 
 /* One context over this rank's parts of two meshes. */
@@ -90,7 +92,8 @@ static void check_promises(const tm_mesh *source, const tm_mesh *target, remap_f
 
   if (set_up(&b, MPI_COMM_WORLD, source, target, faces, 0)) {
     double *lin = evaluate(&b, 0, linear), *got = tm_alloc_(b.cells[1], sizeof *got), *one = tm_alloc_(b.cells[0], sizeof *one);
-    double *got_one = tm_alloc_(b.cells[1], sizeof *got_one), *wave = evaluate(&b, 0, wavy), *got_wave = tm_alloc_(b.cells[1], sizeof *got);
+    double *got_one = tm_alloc_(b.cells[1], sizeof *got_one), *got_wave = tm_alloc_(b.cells[1], sizeof *got_wave);
+    double *wave = evaluate(&b, 0, wavy);
     remap_cover       *cover = tm_alloc_(b.cells[1], sizeof *cover);
     remap_field_report report[3];
     double             largest = 0, error = 0;
@@ -101,7 +104,8 @@ static void check_promises(const tm_mesh *source, const tm_mesh *target, remap_f
                                   {.name = "wave", .nature = REMAP_CONSERVED, .in = wave, .out = got_wave}};
     RT_EQ(remap_get_stats(b.ctx, &stats), REMAP_OK);
     for (int side = 0; side < 2; side++)
-      if (!RT_CHECK(stats.max_closure_error[side] <= 1e-12)) printf("# %s: closure of side %d: %g\n", what, side, stats.max_closure_error[side]);
+      if (!RT_CHECK(stats.max_closure_error[side] <= 1e-12))
+        printf("# %s: closure of side %d: %g\n", what, side, stats.max_closure_error[side]);
     remap_transfer_default(&how);
     how.limiter = REMAP_LIMITER_NONE;
     if (!RT_EQ(remap_field(b.ctx, REMAP_FORWARD, &how, 3, fields, report), REMAP_OK)) printf("# %s\n", remap_message(b.ctx));
@@ -114,7 +118,8 @@ static void check_promises(const tm_mesh *source, const tm_mesh *target, remap_f
     MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     if (!RT_CHECK(error <= 1e-12 * largest)) printf("# %s: linear field errs by %g of %g\n", what, error, largest);
     for (int k = 0; k < 3; k++)
-      if (!RT_CHECK(report[k].conservation_error <= 1e-14)) printf("# %s: conservation of %s: %g\n", what, fields[k].name, report[k].conservation_error);
+      if (!RT_CHECK(report[k].conservation_error <= 1e-14))
+        printf("# %s: conservation of %s: %g\n", what, fields[k].name, report[k].conservation_error);
     free(lin), free(got), free(one), free(got_one), free(wave), free(got_wave), free(cover);
   }
   tear_down(&b);
@@ -179,7 +184,7 @@ static void remapping_onto_the_same_mesh_is_a_bitwise_copy(void)
 /* Both directions with limiter, by global id. */
 static void transfer_both_ways(bench *b, int64_t num_source, int64_t num_target, double *by_source, double *by_target)
 {
-  double          *u = evaluate(b, 0, wavy), *v = tm_alloc_(b->cells[1], sizeof *v), *back = tm_alloc_(b->cells[0], sizeof *back);
+  double *u = evaluate(b, 0, wavy), *v = tm_alloc_(b->cells[1], sizeof *v), *back = tm_alloc_(b->cells[0], sizeof *back);
   remap_field_desc there = {.name = "wave", .nature = REMAP_CONSERVED, .in = u, .out = v};
   remap_field_desc home  = {.name = "wave", .nature = REMAP_CONSERVED, .in = v, .out = back};
 
@@ -200,7 +205,8 @@ static void fields_are_the_same_bits_on_any_ranks_for_any_partition_and_numberin
     for (uint64_t seed = 1; seed <= 3; seed++) {
       tm_mesh *source = kinds[pair[p][0]].make(4), *target = kinds[pair[p][1]].make(5);
       const int64_t ns = source->view.num_cells, nt = target->view.num_cells;
-      double  *want[2] = {tm_alloc_(ns, sizeof(double)), tm_alloc_(nt, sizeof(double))}, *got[2] = {tm_alloc_(ns, sizeof(double)), tm_alloc_(nt, sizeof(double))};
+      double  *want[2] = {tm_alloc_(ns, sizeof(double)), tm_alloc_(nt, sizeof(double))};
+      double  *got[2]  = {tm_alloc_(ns, sizeof(double)), tm_alloc_(nt, sizeof(double))};
       bench    alone, together;
       const bool ok_alone = set_up(&alone, MPI_COMM_SELF, source, target, REMAP_FACES_CENTRE, 0);
       const bool ok = set_up(&together, MPI_COMM_WORLD, source, target, REMAP_FACES_CENTRE, seed);
@@ -251,6 +257,6 @@ static void cells_across_a_patched_interface_are_covered_unless_it_gapes(void)
   }
 }
 
-RT_MAIN(RT_CASE(cells_across_a_patched_interface_are_covered_unless_it_gapes), RT_CASE(every_kind_of_mesh_keeps_the_promises), RT_CASE(scaled_and_moved_meshes_keep_the_promises),
-        RT_CASE(remapping_onto_the_same_mesh_is_a_bitwise_copy),
+RT_MAIN(RT_CASE(cells_across_a_patched_interface_are_covered_unless_it_gapes), RT_CASE(every_kind_of_mesh_keeps_the_promises),
+        RT_CASE(scaled_and_moved_meshes_keep_the_promises), RT_CASE(remapping_onto_the_same_mesh_is_a_bitwise_copy),
         RT_CASE(fields_are_the_same_bits_on_any_ranks_for_any_partition_and_numbering))

@@ -1,5 +1,5 @@
-/* bench_accuracy -- how well pairs add up to their cells where that is hard: the worst closure, abs(sum of V - V_cell) / V_cell, over
- * the covered cells of either mesh, as a table. The bar is 1e-12.
+/* bench_accuracy -- how well pairs add up to their cells where that is hard: the worst closure, abs(sum of V - V_cell) /
+ * V_cell, over the covered cells of either mesh, as a table. The bar is 1e-12.
  *
  *   bench_accuracy */
 #include "laid.h"
@@ -53,7 +53,8 @@ int main(void)
 
   printf("| case | by | faces | pairs | source | target |\n|---|---|---|---|---|---|\n");
   for (int faces = 0; faces < 2; faces++) {
-    for (double aspect = 1; aspect < 2e5; aspect *= 10) { /* turned layers of pancakes, each mesh in the other's planes only by chance */
+    /* Turned layers of pancakes, each mesh in the other's planes only by chance. */
+    for (double aspect = 1; aspect < 2e5; aspect *= 10) {
       const placing p      = {{1, 1, 1 / aspect}, 0.3, {0, 0, 0}};
       tm_mesh      *mesh[2] = {tm_hexahedra((int[]){7, 7, 7}, tm_warp, &one), tm_hexahedra((int[]){8, 8, 8}, tm_warp, &other)};
       for (int side = 0; side < 2; side++) tm_move(mesh[side], place, &p);

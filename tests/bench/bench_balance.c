@@ -13,8 +13,8 @@ static void run(const char *name, int n, const char *faces)
   balance_open_on(&b, MPI_COMM_WORLD, name, n, strcmp(faces, "centre") ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE);
   const balance_work *w        = &b.here;
   const double        cpu      = w->seconds[1] + w->seconds[2];
-  const double        ratio[4] = {balance_ratio(&b, balance_cost(w)), balance_ratio(&b, w->triangles), balance_ratio(&b, w->crossings),
-                                  balance_ratio(&b, cpu)};
+  const double ratio[4] = {balance_ratio(&b, balance_cost(w)), balance_ratio(&b, w->triangles), balance_ratio(&b, w->crossings),
+                           balance_ratio(&b, cpu)};
 
   memcpy(sum, (double[6]){w->cells, w->triangles, w->crossings, w->pairs, w->seconds[0], cpu}, sizeof sum);
   memcpy(most, (double[2]){b.piece_bytes, b.overlay_bytes}, sizeof most);
@@ -22,8 +22,8 @@ static void run(const char *name, int n, const char *faces)
   MPI_Allreduce(MPI_IN_PLACE, most, 2, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
   if (b.comm.rank == 0 && b.status == REMAP_OK)
     printf("{\"bench\":\"balance\",\"ranks\":%d,\"case\":\"%s\",\"n\":%d,\"faces\":\"%s\",\"work\":%.3f,\"triangles\":%.3f,"
-           "\"crossings\":%.3f,\"cpu\":%.3f,\"all_cells\":%.0f,\"all_triangles\":%.0f,\"all_crossings\":%.0f,\"all_pairs\":%.0f,"
-           "\"cpu_partition\":%.3f,\"cpu_overlay\":%.3f,\"piece_bytes\":%.0f,\"overlay_bytes\":%.0f}\n",
+           "\"crossings\":%.3f,\"cpu\":%.3f,\"all_cells\":%.0f,\"all_triangles\":%.0f,\"all_crossings\":%.0f,"
+           "\"all_pairs\":%.0f,\"cpu_partition\":%.3f,\"cpu_overlay\":%.3f,\"piece_bytes\":%.0f,\"overlay_bytes\":%.0f}\n",
            b.comm.size, name, n, faces, ratio[0], ratio[1], ratio[2], ratio[3], sum[0], sum[1], sum[2], sum[3], sum[4], sum[5],
            most[0], most[1]);
   if (b.comm.rank == 0 && b.status != REMAP_OK)

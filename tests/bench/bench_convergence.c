@@ -1,6 +1,6 @@
-/* bench_convergence -- how the error of a transfer falls with the size of cells, for each order and limiter. One rank; means over
- * cells of analytic fields are carried from a mesh of N^3 to one of (N + d)^3 that is warped otherwise, and compared with the means
- * over the target cells. One line per field, order and limiter: norms at N and 2 N and the orders between them.
+/* bench_convergence -- how the error of a transfer falls with the size of cells, for each order and limiter. One rank; means
+ * over cells of analytic fields are carried from a mesh of N^3 to one of (N + d)^3 that is warped otherwise, and compared with
+ * the means over the target cells. One line per field, order and limiter: norms at N and 2 N and the orders between them.
  *
  *   bench_convergence hexahedra|tetrahedra|dual|mixed N [d] */
 #include <time.h>

@@ -75,9 +75,11 @@ int main(int argc, char **argv)
 
   const int    n = argc > 1 ? atoi(argv[1]) : 32, steps = argc > 2 ? atoi(argv[2]) : 50;
   const double top = argc > 3 ? atof(argv[3]) : .743;
-  tm_mesh     *whole[2] = {tm_hexahedra((int[]){n, n, n}, NULL, NULL), tm_hexahedra((int[]){(n + 3) / 4, 2 * n, (n + 1) / 2}, to_ring, &top)};
+  tm_mesh     *whole[2] = {tm_hexahedra((int[]){n, n, n}, NULL, NULL),
+                           tm_hexahedra((int[]){(n + 3) / 4, 2 * n, (n + 1) / 2}, to_ring, &top)};
   tm_mesh     *mine[2];
-  double      *move = tm_alloc_(5 * steps, sizeof *move), *fresh = move + steps, *move_all = fresh + steps, *fresh_all = move_all + steps;
+  double      *move = tm_alloc_(5 * steps, sizeof *move), *fresh = move + steps;
+  double      *move_all = fresh + steps, *fresh_all = move_all + steps;
   double      *field = fresh_all + steps, *q[2];
   remap_context *moving = NULL, *anew = NULL;
   remap_stats    stats;
@@ -124,10 +126,11 @@ int main(int argc, char **argv)
   if (status == REMAP_OK && rank == 0) {
     const double a = median(move, steps), b = median(fresh, steps), c = median(move_all, steps), d = median(fresh_all, steps);
 
-    printf("{\"bench\":\"move\",\"ranks\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,\"steps\":%d,\"seconds_move\":%.4f,\"seconds_build\":%.4f,"
-           "\"share\":%.3f,\"seconds_step_move\":%.4f,\"seconds_step_build\":%.4f,\"share_step\":%.3f,\"seconds_partition\":%.4f,\"seconds_overlay\":%.4f,\"seconds_field\":%.5f}\n",
-           size, (long long)cells[0], (long long)cells[1], (long long)stats.pairs, steps, a, b, a / b, c, d, c / d, stats.seconds_partition,
-           stats.seconds_overlay, median(field, steps));
+    printf("{\"bench\":\"move\",\"ranks\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,\"steps\":%d,\"seconds_move\":%.4f,"
+           "\"seconds_build\":%.4f,\"share\":%.3f,\"seconds_step_move\":%.4f,\"seconds_step_build\":%.4f,\"share_step\":%.3f,"
+           "\"seconds_partition\":%.4f,\"seconds_overlay\":%.4f,\"seconds_field\":%.5f}\n",
+           size, (long long)cells[0], (long long)cells[1], (long long)stats.pairs, steps, a, b, a / b, c, d, c / d,
+           stats.seconds_partition, stats.seconds_overlay, median(field, steps));
   }
   remap_destroy(&moving), remap_destroy(&anew);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);

@@ -1,7 +1,9 @@
 /* bench_openfoam -- write the meshes of a case as two OpenFOAM cases, FOLDER/source and FOLDER/target, with one uniform field,
  * for openfoam.sh. Internal faces come first, each owned by the lower of its cells, in the order of owners and neighbours.
  *
- *   bench_openfoam CASE N FOLDER      cases: bench.h; the folders source/system, source/constant/polyMesh, source/0 ... must exist */
+ *   bench_openfoam CASE N FOLDER
+ *
+ * Cases: bench.h. The folders source/system, source/constant/polyMesh, source/0 ... must exist. */
 #include "bench.h"
 
 /* A file of the case, opened and with its header written. */

@@ -178,7 +178,8 @@ static void flows_bring_items_and_the_worst_status_of_their_senders(void)
         const double *got = (const double *)(const void *)flow[f].received;
 
         RT_EQ(rm_flow_wait(&comm, &flow[f], NULL, &note[f]), run == 2 && f == 1 && others ? REMAP_BAD_ARGUMENT : REMAP_OK);
-        for (int64_t k = 0; k < n; k++) RT_NEAR(got[k], run == 2 && f == 1 && rank[k] != comm.rank ? 0.0 : 1000 * rank[k] + 100 * f + item[k], 0.0);
+        for (int64_t k = 0; k < n; k++)
+          RT_NEAR(got[k], run == 2 && f == 1 && rank[k] != comm.rank ? 0.0 : 1000 * rank[k] + 100 * f + item[k], 0.0);
         RT_EQ(note[f].status, run == 1 && hears ? REMAP_COVERAGE : said);
       }
     }
@@ -279,6 +280,6 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
         RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
         RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
-        RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders), RT_CASE(who_says_something_else_is_apart_from_its_peers),
-        RT_CASE(only_neighbours_take_part_in_a_plan),
+        RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders),
+        RT_CASE(who_says_something_else_is_apart_from_its_peers), RT_CASE(only_neighbours_take_part_in_a_plan),
         RT_CASE(a_rank_without_memory_stops_a_plan_everywhere))

@@ -310,8 +310,8 @@ static void old_values_are_checked_where_they_are_kept_and_nowhere_else(void)
   }
 }
 
-/* As many overlaps count against a cell as for it, as where a mesh is tangled: the volumes cancel, yet a value comes out, within
- * those given. */
+/* As many overlaps count against a cell as for it, as where a mesh is tangled: the volumes cancel, yet a value comes out,
+ * within those given. */
 static void volumes_that_cancel_leave_finite_values(void)
 {
   job               j;

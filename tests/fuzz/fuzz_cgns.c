@@ -1,6 +1,6 @@
 /* Any file that HDF5 can open is refused with a message or read; what was read can be overlaid, and written and read again;
- * nothing crashes or hangs, and all ranks agree. The bytes choose a small valid file and damage its nodes: labels, types, names,
- * shapes, values, links, whole branches, and at last its length. */
+ * nothing crashes or hangs, and all ranks agree. The bytes choose a small valid file and damage its nodes: labels, types,
+ * names, shapes, values, links, whole branches, and at last its length. */
 #include "files.h"
 #include "fuzz.h"
 
@@ -17,11 +17,13 @@ static void write_blocks(const char *path)
   rcgns_message  why;
 
   for (int i = 0; i < 27; i++)
-    for (int d = 0; d < 3; d++) xyz[3 * i + d] = d == 0 ? i % 3 : d == 1 ? i / 3 % 3 : i / 9; /* NOLINT(bugprone-integer-division) */
+    for (int d = 0; d < 3; d++)
+      xyz[3 * i + d] = d == 0 ? i % 3 : d == 1 ? i / 3 % 3 : i / 9; /* NOLINT(bugprone-integer-division) */
   for (int i = 0; i < 8; i++) value[i] = i;
   const rcgns_new_field field = {"Density", value};
   for (int z = 0; z < 2; z++)
-    zone[z] = (rcgns_new_zone){.name = z ? "B" : "A", .num_vertices = {3, 3, 3}, .node_xyz = xyz, .num_fields = 1, .field = &field};
+    zone[z] =
+        (rcgns_new_zone){.name = z ? "B" : "A", .num_vertices = {3, 3, 3}, .node_xyz = xyz, .num_fields = 1, .field = &field};
   FUZZ_CHECK(rcgns_create(path, 4.2, "FlowSolution", 2, zone, &why) == RCGNS_OK);
 }
 
@@ -51,8 +53,8 @@ static void put_bc(cf_file *f, int64_t zone, const char *place, int nd, const in
 static void write_elements(const char *path, bool mixed)
 {
   static const double  value[CF_ZOO_CELLS] = {1, 2, 3, 4, 5};
-  static const int64_t together[] = {17, 1, 2, 5, 4, 7, 8, 11, 10, 14, 2, 3, 6, 8, 9, 12, 14, 2, 6, 5, 8, 12, 11, 12, 7, 8, 11, 10, 13,
-                                     10, 8, 9, 12, 14};
+  static const int64_t together[] = {17, 1, 2, 5, 4,  7,  8,  11, 10, 14, 2,  3,  6,  8, 9, 12, 14,
+                                     2,  6, 5, 8, 12, 11, 12, 7,  8,  11, 10, 13, 10, 8, 9, 12, 14};
   static const int64_t offset[]   = {0, 9, 16, 23, 29, 34};
   cf_file      *f    = cf_new(4.2);
   const int64_t base = cf_base(f), zone = cf_zoo_zone(f, base, "Z");
@@ -116,7 +118,8 @@ static void write_rind(const char *path)
   const int64_t zone = cf_zone(f, cf_base(f), "Z", 3, (int64_t[]){3, 3, 3, 2, 2, 2, 0, 0, 0}), layer[6] = {1, 1, 1, 1, 1, 1};
 
   for (int i = 0; i < 125; i++)
-    for (int d = 0; d < 3; d++) xyz[3 * i + d] = d == 0 ? i % 5 : d == 1 ? i / 5 % 5 : i / 25; /* NOLINT(bugprone-integer-division) */
+    for (int d = 0; d < 3; d++)
+      xyz[3 * i + d] = d == 0 ? i % 5 : d == 1 ? i / 5 % 5 : i / 25; /* NOLINT(bugprone-integer-division) */
   for (int i = 0; i < 64; i++) value[i] = i;
   cf_ints(f, cf_coordinates(f, zone, xyz, 3, (int64_t[]){5, 5, 5}), "Rind", "Rind_t", 6, layer);
   const int64_t solution = cf_solution(f, zone, "S", "Density", 0, NULL);
@@ -126,7 +129,7 @@ static void write_rind(const char *path)
   cf_write(f, path);
 }
 
-/* ---- damage: rank 0 alone ------------------------------------------------------------------------------------------------- */
+/* ---- damage: rank 0 alone ------------------------------------------------------------------------------------------------ */
 
 /* The nodes of the file, as paths. */
 typedef struct node_list {
@@ -154,24 +157,28 @@ static const char *any_label(fuzz_bytes *b)
 
 static const char *any_name(fuzz_bytes *b)
 {
-  static const char *const name[] = {"GridCoordinates", "CoordinateX",    "CoordinateR",   "ElementRange", "ElementConnectivity",
-                                     "Density",         "ParentElements", "ParentData",    "Rind",         "ElementStartOffset",
-                                     "GridLocation",    "ZoneType",       "PointList",     "PointRange",   "FlowSolutionPointers",
-                                     "TimeValues",      "Z",              "Base",          "NumberOfSteps", "a name of more than 32 letters in all"};
+  static const char *const name[] = {"GridCoordinates",     "CoordinateX",        "CoordinateR",          "ElementRange",
+                                     "ElementConnectivity", "Density",            "ParentElements",       "ParentData",
+                                     "Rind",                "ElementStartOffset", "GridLocation",         "ZoneType",
+                                     "PointList",           "PointRange",         "FlowSolutionPointers", "TimeValues",
+                                     "Z",                   "Base",               "NumberOfSteps",
+                                     "a name of more than 32 letters in all"};
   return name[fuzz_below(b, (int64_t)(sizeof name / sizeof *name))];
 }
 
 static const char *any_text(fuzz_bytes *b)
 {
-  static const char *const text[] = {"Structured", "Unstructured", "CellCenter", "Vertex", "FaceCenter", "UserDefined", "Null", " ",
-                                     "First",      "/Base/Z",      "/",          "Base/Z/..", "/nowhere", "\xff\xfe"};
+  static const char *const text[] = {"Structured",  "Unstructured", "CellCenter", "Vertex",  "FaceCenter",
+                                     "UserDefined", "Null",         " ",          "First",   "/Base/Z",
+                                     "/",           "Base/Z/..",    "/nowhere",   "\xff\xfe"};
   return text[fuzz_below(b, (int64_t)(sizeof text / sizeof *text))];
 }
 
 static hid_t any_type(fuzz_bytes *b)
 {
-  const hid_t type[] = {H5T_NATIVE_INT32, H5T_NATIVE_INT64,  H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT, H5T_NATIVE_SCHAR, H5T_NATIVE_UINT32,
-                        H5T_NATIVE_INT16, H5T_NATIVE_UINT64, H5T_STD_I64BE,     H5T_NATIVE_UCHAR, H5T_NATIVE_LDOUBLE};
+  const hid_t type[] = {H5T_NATIVE_INT32, H5T_NATIVE_INT64,  H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT,
+                        H5T_NATIVE_SCHAR, H5T_NATIVE_UINT32, H5T_NATIVE_INT16,  H5T_NATIVE_UINT64,
+                        H5T_STD_I64BE,    H5T_NATIVE_UCHAR,  H5T_NATIVE_LDOUBLE};
   return type[fuzz_below(b, (int64_t)(sizeof type / sizeof *type))];
 }
 
@@ -300,7 +307,7 @@ static void damage_file(const char *path, fuzz_bytes *b)
   fclose(stream);
 }
 
-/* ---- what must hold --------------------------------------------------------------------------------------------------------- */
+/* ---- what must hold ------------------------------------------------------------------------------------------------------ */
 
 /* All ranks got the same, and a failure says why. Collective. */
 static void check_status(rcgns_status status, const rcgns_message *why)

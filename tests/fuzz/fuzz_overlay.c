@@ -1,8 +1,8 @@
 /* Pairs of small polyhedral meshes whose coordinates have so few bits that nodes, edges and faces of the two coincide: the
- * overlay never contradicts itself, volumes and first moments of a covered cell's pairs sum to its own, the pairs of the swapped
- * meshes are the same, and constants stay constant. The bytes choose two meshes, move and merge their nodes and merge their
- * cells; cells may become tangled, inverted or flat. On more than one rank the cells are dealt by lot, and everything must be
- * bitwise what one rank finds. */
+ * overlay never contradicts itself, volumes and first moments of a covered cell's pairs sum to its own, the pairs of the
+ * swapped meshes are the same, and constants stay constant. The bytes choose two meshes, move and merge their nodes and merge
+ * their cells; cells may become tangled, inverted or flat. On more than one rank the cells are dealt by lot, and everything
+ * must be bitwise what one rank finds. */
 #include "fuzz.h"
 #include "meshes.h"
 
@@ -52,7 +52,8 @@ static tm_mesh *decode(fuzz_bytes *b, bool *is_tame)
 {
   static tm_mesh *(*const maker[])(const int n[3], tm_map map, const void *data) = {
       tm_hexahedra, tm_hexahedra, tm_tetrahedra, tm_prisms, tm_pyramids, tm_dual};
-  static const double scale[] = {1.0, 1.0, 0.5, 2.0, 0.75, -1.0 + 0x1p-20 + 2.0}, shift[] = {0.0, 0.0, 0.5, 0.25, -0.5, 0x1p-40};
+  static const double scale[] = {1.0, 1.0, 0.5, 2.0, 0.75, -1.0 + 0x1p-20 + 2.0},
+                      shift[] = {0.0, 0.0, 0.5, 0.25, -0.5, 0x1p-40};
   const int           num = (int)(sizeof maker / sizeof *maker), which = (int)fuzz_below(b, num + 1);
   const int           most = which < 2 ? 3 : which < 4 ? 2 : 1;
   int                 n[3];
@@ -120,7 +121,8 @@ static void expect(const remap_context *ctx, remap_status got, remap_status want
   FUZZ_CHECK(got == want);
 }
 
-static remap_context *overlaid(MPI_Comm comm, remap_faces faces, const remap_mesh *source, const remap_mesh *target, remap_status *status)
+static remap_context *overlaid(MPI_Comm comm, remap_faces faces, const remap_mesh *source, const remap_mesh *target,
+                               remap_status *status)
 {
   remap_context *ctx = NULL;
   remap_options  options;
@@ -151,7 +153,7 @@ static void check_closure(remap_context *ctx, int direction, const remap_mesh *g
 {
   const remap_side in = (remap_side)direction, out = (remap_side)(1 - direction);
   const int64_t    n = receiving->num_cells, m = giving->num_cells;
-  double          *volume = tm_alloc_(n, sizeof *volume), *centre = tm_alloc_(3 * m, sizeof *centre), *cube = cube_volumes(receiving);
+  double *volume = tm_alloc_(n, sizeof *volume), *centre = tm_alloc_(3 * m, sizeof *centre), *cube = cube_volumes(receiving);
   double          *own_centre = tm_alloc_(3 * n, sizeof *own_centre);
   bool            *is_covered = covered(ctx, direction, n);
   remap_pairs_view p;

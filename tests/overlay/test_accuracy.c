@@ -1,11 +1,12 @@
-/* Closure of both meshes, 1e-12 per cell, where cells are far from the origin, thin, turned, or much smaller than what they meet;
- * and that a mesh's unit is of no account. */
+/* Closure of both meshes, 1e-12 per cell, where cells are far from the origin, thin, turned, or much smaller than what they
+ * meet; and that a mesh's unit is of no account. */
 #include "laid.h"
 #include "rt.h"
 
 static const double bar = 1e-12;
 
-/* Both ways round and both triangulations; every cell of the side that is inside the other mesh closes, the others if covered. */
+/* Both ways round and both triangulations; every cell of the side that is inside the other mesh closes, the others if
+ * covered. */
 static void closes(tm_mesh *inner, tm_mesh *outer)
 {
   for (int way = 0; way < 4; way++) {

@@ -1,4 +1,5 @@
-/* Overlays of small meshes against brute force in exact rationals: the degenerate positions of two meshes that fail elsewhere. */
+/* Overlays of small meshes against brute force in exact rationals: the degenerate positions of two meshes that fail
+ * elsewhere. */
 #include "oracle.h"
 
 typedef struct spacing {

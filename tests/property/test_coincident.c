@@ -1,5 +1,5 @@
-/* Meshes whose faces coincide give exactly the pairs that share volume: the parent map where cells are nested, eight where they are
- * shifted by half a cell; on any number of ranks. Coordinates are small integers, so that planes coincide exactly. */
+/* Meshes whose faces coincide give exactly the pairs that share volume: the parent map where cells are nested, eight where they
+ * are shifted by half a cell; on any number of ranks. Coordinates are small integers, so that planes coincide exactly. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
@@ -15,7 +15,8 @@ static void to_lattice(double x[3], const void *data)
 static tm_mesh *lattice(int n, double shift) { return tm_hexahedra((int[]){n, n, n}, to_lattice, &shift); }
 
 /* Build the overlay of two lattices of n and m cells a side, the second moved, and hand the rows of the second to `check`. */
-static void overlay(int n, int m, double shift, remap_faces faces, void (*check)(int n, int m, const remap_pairs_view *v, const int64_t *global))
+static void overlay(int n, int m, double shift, remap_faces faces,
+                    void (*check)(int n, int m, const remap_pairs_view *v, const int64_t *global))
 {
   tm_mesh       *whole[2] = {lattice(n, 0), lattice(m, shift)}, *mine[2];
   remap_options  options;

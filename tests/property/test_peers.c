@@ -1,12 +1,15 @@
-/* Where other remappers fail silently (DESIGN section 6), one property each, over seeds, through the public interface: nothing is lost,
- * nothing is made up, whatever the scale, the place and the position of the meshes. */
+/* Where other remappers fail silently (DESIGN section 6), one property each, over seeds, through the public interface: nothing
+ * is lost, nothing is made up, whatever the scale, the place and the position of the meshes. */
 #include <remap/remap.h>
 #include "meshes.h"
 #include "rt.h"
 
 enum { SEEDS = 4 };
 
-static double uniform(uint64_t *seed, double low, double high) { return low + (high - low) * (double)tm_random(seed, 1 << 24) / (1 << 24); }
+static double uniform(uint64_t *seed, double low, double high)
+{
+  return low + (high - low) * (double)tm_random(seed, 1 << 24) / (1 << 24);
+}
 
 /* Rotation by random angles, scale and shift as a 3 x 4 matrix. */
 static void random_motion(uint64_t *seed, double scale, const double shift[3], double m[12])
@@ -20,7 +23,10 @@ static void random_motion(uint64_t *seed, double scale, const double shift[3], d
   }
 }
 
-static tm_mesh *warped(int n, uint64_t *seed) { return tm_hexahedra((int[]){n, n, n}, tm_warp, &(tm_warping){0.03, uniform(seed, 0, 6)}); }
+static tm_mesh *warped(int n, uint64_t *seed)
+{
+  return tm_hexahedra((int[]){n, n, n}, tm_warp, &(tm_warping){0.03, uniform(seed, 0, 6)});
+}
 
 typedef struct result {
   remap_stats        stats;
@@ -48,7 +54,7 @@ static result overlay(const tm_mesh *source, const tm_mesh *target, remap_faces 
   }
   r.ok = rt_all(RT_EQ(remap_build(ctx), REMAP_OK));
   if (r.ok) {
-    double          *one = tm_alloc_(mine[0]->view.num_cells, sizeof *one), *out = tm_alloc_(mine[1]->view.num_cells, sizeof *out);
+    double *one = tm_alloc_(mine[0]->view.num_cells, sizeof *one), *out = tm_alloc_(mine[1]->view.num_cells, sizeof *out);
     remap_field_desc field = {.name = "one", .nature = REMAP_CONSERVED, .in = one, .out = out, .has_old = 1};
 
     for (int64_t c = 0; c < mine[0]->view.num_cells; c++) one[c] = 1;
@@ -90,7 +96,8 @@ static void the_unit_of_length_does_not_matter(void)
       const result r = overlay_once(source, target, REMAP_FACES_CENTRE);
       if (k == 0) pairs = r.stats.pairs;
       RT_CHECK(r.stats.pairs > 0 && llabs(r.stats.pairs - pairs) <= 2); /* coordinates round differently */
-      RT_NEAR(r.stats.overlap_volume / (scale[k] * scale[k] * scale[k]), r.stats.volume[0] / (scale[k] * scale[k] * scale[k]), 0.2);
+      RT_NEAR(r.stats.overlap_volume / (scale[k] * scale[k] * scale[k]), r.stats.volume[0] / (scale[k] * scale[k] * scale[k]),
+              0.2);
     }
   }
 }
@@ -148,7 +155,8 @@ static void cells_a_million_times_smaller_are_not_dropped(void)
     tm_mesh *small = warped(3, &s);
     random_motion(&s, 1e-6, (double[3]){0.5, 0.5 - 3e-7, 0.5}, m); /* about a vertex of eight cells */
     tm_move(small, tm_affine, m);
-    const result r = overlay_once(tm_hexahedra((int[]){2, 2, 2}, tm_warp, &(tm_warping){0.03, 0.4}), small, REMAP_FACES_DIAGONAL);
+    const result r =
+        overlay_once(tm_hexahedra((int[]){2, 2, 2}, tm_warp, &(tm_warping){0.03, 0.4}), small, REMAP_FACES_DIAGONAL);
     RT_EQ(r.stats.cells_by_cover[1][REMAP_COVERED], 27);
     RT_NEAR(r.stats.overlap_volume, r.stats.volume[1], 1e-12 * r.stats.volume[1]);
   }
@@ -173,7 +181,8 @@ static void warped_faces_lose_nothing_on_either_side(void)
     for (int faces = 0; faces < 2; faces++) {
       uint64_t     s = seed;
       double       m[12];
-      tm_mesh     *inside = warped(4, &s), *around = tm_hexahedra((int[]){5, 5, 5}, tm_warp, &(tm_warping){0.05, uniform(&s, 0, 6)});
+      tm_mesh     *inside = warped(4, &s);
+      tm_mesh     *around = tm_hexahedra((int[]){5, 5, 5}, tm_warp, &(tm_warping){0.05, uniform(&s, 0, 6)});
       random_motion(&s, 0.3, (double[3]){0.5, 0.5, 0.5}, m);
       for (int k = 0; k < 3; k++) m[4 * k + 3] -= 0.5 * (m[4 * k] + m[4 * k + 1] + m[4 * k + 2]);
       tm_move(inside, tm_affine, m);
@@ -224,7 +233,8 @@ static void layers_of_pancakes_on_a_curved_wall_fill_each_other(void)
     for (int faces = 0; faces < 2; faces++) {
       uint64_t     s     = seed;
       const double angle = uniform(&s, 0, 6);
-      const result r = overlay_once(tm_hexahedra((int[]){6, 6, 5}, to_curved_wall, &angle), tm_hexahedra((int[]){6, 6, 7}, to_curved_wall, &angle), faces);
+      const result r = overlay_once(tm_hexahedra((int[]){6, 6, 5}, to_curved_wall, &angle),
+                                    tm_hexahedra((int[]){6, 6, 7}, to_curved_wall, &angle), faces);
       RT_NEAR(r.stats.overlap_volume, r.stats.volume[0], 1e-6 * r.stats.volume[0]); /* radii are rounded, each for itself */
       RT_CHECK(r.stats.pairs >= 36 * 11);
       RT_EQ(r.stats.cells_by_cover[0][REMAP_UNCOVERED] + r.stats.cells_by_cover[1][REMAP_UNCOVERED], 0);
@@ -240,7 +250,8 @@ static void to_uneven(double x[3], const void *unused)
 
 static void neighbours_a_thousand_million_times_larger_do_not_matter(void)
 {
-  const result r = overlay_once(tm_hexahedra((int[]){2, 2, 2}, to_uneven, NULL), tm_hexahedra((int[]){4, 4, 4}, to_uneven, NULL), REMAP_FACES_CENTRE);
+  const result r = overlay_once(tm_hexahedra((int[]){2, 2, 2}, to_uneven, NULL),
+                                tm_hexahedra((int[]){4, 4, 4}, to_uneven, NULL), REMAP_FACES_CENTRE);
   RT_NEAR(r.stats.overlap_volume, 1, 1e-14);
   RT_EQ(r.stats.pairs, 64);
   for (uint64_t seed = 1; seed <= SEEDS; seed++) {
@@ -254,9 +265,9 @@ static void neighbours_a_thousand_million_times_larger_do_not_matter(void)
   }
 }
 
-RT_MAIN(RT_CASE(layers_of_pancakes_on_a_curved_wall_fill_each_other), RT_CASE(neighbours_a_thousand_million_times_larger_do_not_matter),
-        RT_CASE(the_unit_of_length_does_not_matter), RT_CASE(a_place_far_from_the_origin_does_not_matter),
-        RT_CASE(a_mesh_inside_one_cell_of_the_other_is_wholly_mapped), RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap),
-        RT_CASE(cells_a_million_times_smaller_are_not_dropped), RT_CASE(rotated_boxes_share_the_volume_known),
-        RT_CASE(warped_faces_lose_nothing_on_either_side), RT_CASE(disjoint_and_touching_meshes_share_nothing),
-        RT_CASE(an_overlap_a_millionth_of_a_millionth_thick_survives))
+RT_MAIN(RT_CASE(layers_of_pancakes_on_a_curved_wall_fill_each_other),
+        RT_CASE(neighbours_a_thousand_million_times_larger_do_not_matter), RT_CASE(the_unit_of_length_does_not_matter),
+        RT_CASE(a_place_far_from_the_origin_does_not_matter), RT_CASE(a_mesh_inside_one_cell_of_the_other_is_wholly_mapped),
+        RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap), RT_CASE(cells_a_million_times_smaller_are_not_dropped),
+        RT_CASE(rotated_boxes_share_the_volume_known), RT_CASE(warped_faces_lose_nothing_on_either_side),
+        RT_CASE(disjoint_and_touching_meshes_share_nothing), RT_CASE(an_overlap_a_millionth_of_a_millionth_thick_survives))

@@ -1,7 +1,8 @@
 /* averages -- smooth and discontinuous fields, their means over the cells of a mesh, and the errors of a transfer.
  *
- * A cell is integrated as the library sees it: its faces triangulated by rm_triangulate, a tetrahedron over each triangle from a
- * point inside, and in each tetrahedron a rule of degree 5 with 14 points (Walkington 2000). 0.7 us per triangle and field. */
+ * A cell is integrated as the library sees it: its faces triangulated by rm_triangulate, a tetrahedron over each triangle from
+ * a point inside, and in each tetrahedron a rule of degree 5 with 14 points (Walkington 2000). 0.7 us per triangle and
+ * field. */
 #ifndef AVERAGES_H
 #define AVERAGES_H
 
@@ -154,8 +155,8 @@ static inline av_error av_difference(int64_t n, const double *volume, const doub
 typedef enum av_kind { AV_HEXAHEDRA, AV_TETRAHEDRA, AV_DUAL, AV_MIXED, AV_NUM_KINDS } av_kind;
 static const char *const av_kind_name[] = {"hexahedra", "tetrahedra", "dual", "mixed"};
 
-/* Meshes of the unit cube on a lattice of n^3, warped by `size` but for its walls; tetrahedra and duals, which have more faces, of
- * one half as fine. */
+/* Meshes of the unit cube on a lattice of n^3, warped by `size` but for its walls; tetrahedra and duals, which have more faces,
+ * of one half as fine. */
 static inline tm_mesh *av_mesh(av_kind kind, int n, double size)
 {
   const int        h       = n / 2 + n % 2;

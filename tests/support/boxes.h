@@ -1,5 +1,5 @@
-/* boxes -- pairs of meshes of axis-parallel boxes, whose overlaps are known in closed form, taken through the room mapping without
- * any overlay. What is tested with them depends on neither predicates nor tracing.
+/* boxes -- pairs of meshes of axis-parallel boxes, whose overlaps are known in closed form, taken through the room mapping
+ * without any overlay. What is tested with them depends on neither predicates nor tracing.
  *
  *   boxes_world world;
  *   boxes_open(&world, MPI_COMM_WORLD, boxes_grid(...), boxes_grid(...), TM_RANDOM);
@@ -41,7 +41,8 @@ static inline void boxes_place_(double xyz[3], const void *data)
   }
 }
 
-/* n[0] x n[1] x n[2] boxes. The caller's, or boxes_open's. high below low along an odd number of axes makes all cells inverted. */
+/* n[0] x n[1] x n[2] boxes. The caller's, or boxes_open's. high below low along an odd number of axes makes all cells
+ * inverted. */
 static inline tm_mesh *boxes_grid(int nx, int ny, int nz, boxes_shape shape)
 {
   return tm_hexahedra((int[]){nx, ny, nz}, boxes_place_, &shape);
@@ -201,7 +202,8 @@ static inline void boxes_open_meshes(boxes_world *world, MPI_Comm comm, tm_mesh 
     RT_EQ(rm_mesh_build(world->arena, &world->comm, (remap_side)side, &view[side], &world->frame, REMAP_FACES_CENTRE,
                         &world->mesh[side], &reason),
           REMAP_OK);
-    RT_EQ(rm_stencil_build(world->arena, &world->comm, &world->frame, world->mesh[side], NULL, &world->stencil[side]), REMAP_OK);
+    RT_EQ(rm_stencil_build(world->arena, &world->comm, &world->frame, world->mesh[side], NULL, &world->stencil[side]),
+          REMAP_OK);
   }
   for (int side = 0; side < 2; side++) tm_free(part[side]);
 }

@@ -1,5 +1,5 @@
-/* carried -- two meshes, the means of an analytic field on both, and transfers between them through the public interface. Needs a
- * main of rt.h. Everything is collective on the communicator of carried_open. */
+/* carried -- two meshes, the means of an analytic field on both, and transfers between them through the public interface. Needs
+ * a main of rt.h. Everything is collective on the communicator of carried_open. */
 #ifndef CARRIED_H
 #define CARRIED_H
 
@@ -14,7 +14,8 @@ typedef struct carried {
   double        *volume[2], *mean[2], *got[2];
 } carried;
 
-/* Two meshes, freed here, dealt to the ranks of comm; with a seed other than 0, at random and renumbered. False if that failed. */
+/* Two meshes, freed here, dealt to the ranks of comm; with a seed other than 0, at random and renumbered. False if that
+ * failed. */
 static inline bool carried_open(carried *w, MPI_Comm comm, int max_order, tm_mesh *source, tm_mesh *target, uint64_t seed)
 {
   tm_mesh      *whole[2] = {source, target};

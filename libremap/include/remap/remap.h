@@ -139,8 +139,8 @@ typedef enum remap_on_partial {
   REMAP_PARTIAL_ERROR     = 3  /**< remap_field returns REMAP_COVERAGE */
 } remap_on_partial;
 
-/** How much of a cell the other mesh covers. Decided by whether that mesh's skin passes through the cell, exactly; a part left over
- *  that is not even rounding of the cell's volume (2^-44 of it) does not count. */
+/** How much of a cell the other mesh covers. Decided by whether that mesh's skin passes through the cell, exactly; a part left
+ *  over that is not even rounding of the cell's volume (2^-44 of it) does not count. */
 typedef enum remap_cover {
   REMAP_UNCOVERED = 0, /**< no pair */
   REMAP_PARTIAL   = 1, /**< pairs, and a part outside of the other mesh */
@@ -212,20 +212,20 @@ typedef struct remap_transfer {
   double             gamma;        /**< ratio of specific heats of an ideal gas, above 1; default 0: unknown */
   double             gas_constant; /**< R of p = rho R T; default 0: unknown */
   int                allow_nan;    /**< not 0: values that are no finite numbers pass, and spoil the cells they reach */
-  const double      *rotation;     /**< [3][3] by rows, orthogonal: a vector v of the source is rotation v in the target (backward
-                                        its transpose is used); read when the transfer starts; default NULL: none */
+  const double      *rotation;     /**< [3][3] by rows, orthogonal: a vector v of the source is rotation v in the target
+                                        (backward its transpose is used); read when the transfer starts; default NULL: none */
 } remap_transfer;
 
 /** One field of a call of remap_field.
  *
  *  Fields with the same number `system` > 0 form a system: a density and what moves with the mass. They are reconstructed as
  *  density, amounts per mass (velocity, others) about the centre of mass, and internal energy, so that velocity, pressure (if
- *  given: temperature) and amounts per mass stay uniform where they are; then, in the few giving cells where that is not enough,
- *  all slopes of the system are scaled down by one factor until every receiving cell has a density and an internal energy above
- *  0 and amounts per mass within the bounds around its givers. Mass, momentum, total energy and other amounts are conserved.
- *  Velocity, pressure, temperature and MASS_SPECIFIC fields are converted, moved as amounts, and converted back; cells that are
- *  the same are copied. A transfer with a system of order 2 or 3 is collective. Its integrals are those of the amounts: of
- *  momentum for a velocity, of total energy for a pressure. */
+ *  given: temperature) and amounts per mass stay uniform where they are; then, in the few giving cells where that is not
+ *  enough, all slopes of the system are scaled down by one factor until every receiving cell has a density and an internal
+ *  energy above 0 and amounts per mass within the bounds around its givers. Mass, momentum, total energy and other amounts are
+ *  conserved. Velocity, pressure, temperature and MASS_SPECIFIC fields are converted, moved as amounts, and converted back;
+ *  cells that are the same are copied. A transfer with a system of order 2 or 3 is collective. Its integrals are those of the
+ *  amounts: of momentum for a velocity, of total energy for a pressure. */
 typedef struct remap_field_desc {
   const char   *name;    /**< used in messages; may be NULL */
   remap_nature  nature;
@@ -427,8 +427,8 @@ REMAP_API remap_status remap_set_masks(remap_context *ctx, const remap_masks *ma
 /** Transfer num_fields cell fields. Called by all ranks; all of transfer, num_fields, names, natures and has_old agree on
  *  all of them. The first call in a direction after a build, and one that asks for more than those before (more fields, a
  *  higher order, another limiter, nearest cells), prepares it: it is collective. So is one with REMAP_LIMITER_CAAS or a system,
- *  and one with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other call
- *  exchanges messages with neighbours only (and notes with three ranks at most that need not be) and takes no memory: its
+ *  and one with reports, [num_fields] on every rank or NULL on every rank, which get the same content everywhere. Any other
+ *  call exchanges messages with neighbours only (and notes with three ranks at most that need not be) and takes no memory: its
  *  status is the worst of this rank's own and of those neighbours' whose values it uses, and may differ from rank to rank;
  *  remap_agree makes it one. transfer NULL means the defaults. Values below 1e-280 count as 0.
  *  Errors: BAD_ORDER (no overlay), BAD_ARGUMENT, BAD_VALUE (a NaN or infinite value, a density in a system that is not
@@ -474,8 +474,8 @@ REMAP_API remap_status remap_coverage(remap_context *ctx, remap_side side, doubl
 REMAP_API remap_status remap_uncovered(remap_context *ctx, remap_side side, int64_t *num, int64_t *cell);
 
 /** The cells of one side, over all ranks, that are covered in part and least of all: ascending by fraction. Collective; the
- *  same on every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in it. Masks
- *  count as in remap_coverage.
+ *  same on every rank. At entry *num is the room in cell, the caller's and the same on every rank; then how many there are in
+ *  it. Masks count as in remap_coverage.
  *  Errors: BAD_ORDER, BAD_ARGUMENT, NO_MEMORY, MPI_FAILURE. */
 REMAP_API remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, remap_partial_cell *cell);
 

@@ -65,7 +65,8 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
     return duplicated;
   }
   if (status == REMAP_OK) { /* options agree if their extremes do */
-    int64_t extreme[8] = {ctx->options.faces, ctx->options.max_order, !!ctx->options.zone_overlap_is_error, !!ctx->options.systems};
+    int64_t extreme[8] = {ctx->options.faces, ctx->options.max_order, !!ctx->options.zone_overlap_is_error,
+                          !!ctx->options.systems};
     for (int k = 0; k < 4; k++) extreme[4 + k] = -extreme[k];
     const remap_status reduced = rm_comm_max_i64(&own, extreme, 8);
     for (int k = 0; k < 4 && reduced == REMAP_OK; k++)

@@ -73,7 +73,7 @@ struct remap_context {
   rm_arena         *mask_arena; /* of what masks change, NULL: there are none */
   const uint8_t    *gives[2], *wants[2]; /* [side] NULL: all do, on every rank */
   const rm_mapping *masked[2];           /* [direction] what transfers see; mapping itself without masks */
-  const rm_stencil *giving_stencil[2], *giving_wide[2], *wanting_stencil[2], *wanting_wide[2]; /* [side] among cells that give, or want */
+  const rm_stencil *giving_stencil[2], *giving_wide[2], *wanting_stencil[2], *wanting_wide[2]; /* of cells that do */
   rm_arena         *carrier_arena[2]; /* [direction] of the carrier alone, which is made anew when more has to fit in */
   rm_carrier       *carrier[2];       /* [direction] NULL until needed                                                */
   rm_load           load[2];          /* [direction] that the carrier is made for                                     */

@@ -1,5 +1,5 @@
-/* read -- the caller's meshes as room mesh has them. A mesh that has not moved is kept from the last overlay, unless the frame's
- * scale has changed; so is its stencil, unless the frame has. O(n) for what is read. */
+/* read -- the caller's meshes as room mesh has them. A mesh that has not moved is kept from the last overlay, unless the
+ * frame's scale has changed; so is its stencil, unless the frame has. O(n) for what is read. */
 #include "api/context.h"
 
 #include <math.h>
@@ -18,8 +18,9 @@ static remap_status copy_labels(rm_arena *arena, int side, const remap_mesh *giv
 {
   const char **zone;
   int64_t     *offset;
+  const char  *name = given->name ? given->name : side == REMAP_SOURCE ? "source mesh" : "target mesh";
 
-  *out = (rm_labels){.mesh = copy_text(arena, given->name ? given->name : side == REMAP_SOURCE ? "source mesh" : "target mesh")};
+  *out = (rm_labels){.mesh = copy_text(arena, name)};
   if (!out->mesh) return REMAP_NO_MEMORY;
   if (given->num_zones == 0) return REMAP_OK;
   if (given->num_zones < 0 || !given->zone_name || !given->zone_cell_offset)
@@ -126,11 +127,12 @@ remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena
   RM_TRY(find_frame(ctx, is_new, passing, given, reason));
   const double unit = 1 / ctx->frame.scale, cubed = unit * unit * unit; /* the same on all ranks */
   if (!isnormal(cubed) || !isnormal(cubed * unit * unit))
-    return rm_fail(REMAP_BAD_MESH, reason, -1, -1, "the largest coordinate is about %.1g: volumes and moments are no doubles in this unit", unit);
+    return rm_fail(REMAP_BAD_MESH, reason, -1, -1,
+                   "the largest coordinate is about %.1g: volumes and moments are no doubles in this unit", unit);
   for (int side = 0; side < 2; side++) {
     if (is_new[side])
-      RM_TRY(rm_mesh_build(ctx->mesh_arena[side], &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces, &ctx->mesh[side],
-                           reason));
+      RM_TRY(rm_mesh_build(ctx->mesh_arena[side], &ctx->comm, side, &given[side], &ctx->frame, ctx->options.faces,
+                           &ctx->mesh[side], reason));
     if (is_new[side]) RM_TRY(rm_context_measure(ctx, side, &given[side], reason));
     RM_TRY(rm_comm_agree_reason(&ctx->comm, rm_context_progress(ctx, "checking of meshes", 0.5 * (side + 1)), reason));
   }

@@ -132,7 +132,8 @@ remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, 
   rm_reason    reason  = {-1, -1, ""};
   rm_arena    *scratch = rm_arena_new();
   int64_t      room[2] = {num ? *num : -1, num ? -*num : 1};
-  remap_status status  = rm_context_check_view(ctx, is_side(side) && room[0] >= 0 && (room[0] == 0 || cell), "remap_partial_cells");
+  remap_status status =
+      rm_context_check_view(ctx, is_side(side) && room[0] >= 0 && (room[0] == 0 || cell), "remap_partial_cells");
 
   if (status != REMAP_OK) rm_fail(status, &reason, -1, -1, "%s", ctx->message);
   if (!scratch) status = REMAP_NO_MEMORY;

@@ -52,13 +52,15 @@ typedef struct rm_arena rm_arena;
 rm_arena *rm_arena_new(void);
 /* Give everything back; NULL is fine. */
 void rm_arena_drop(rm_arena *arena);
-/* count * size bytes, not cleared; NULL if memory is out or the product overflows. count 0 gives a valid pointer. Owned by arena. */
+/* count * size bytes, not cleared; NULL if memory is out or the product overflows. count 0 gives a valid pointer. Owned by
+ * arena. */
 void *rm_arena_alloc(rm_arena *arena, int64_t count, size_t size);
 /* The same, cleared to zero. */
 void *rm_arena_zero(rm_arena *arena, int64_t count, size_t size);
 /* Bytes in use. */
 size_t rm_arena_bytes(const rm_arena *arena);
-/* ptr = RM_NEW(arena, count, type): returns NO_MEMORY from the calling function if there is none. Only where nothing is owned. */
+/* ptr = RM_NEW(arena, count, type): returns NO_MEMORY from the calling function if there is none. Only where nothing is
+ * owned. */
 #define RM_NEW(ptr, arena, count)                                                                    \
   do {                                                                                               \
     if (!((ptr) = rm_arena_alloc((arena), (int64_t)(count), sizeof *(ptr)))) return REMAP_NO_MEMORY; \

@@ -49,8 +49,8 @@ typedef struct rm_plan {
 } rm_plan;
 /* This rank wants item want_item[k] of rank want_rank[k], k < num_want, want_rank ascending. Received items come in that order.
  * The plan lives in arena. */
-remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank, const rm_lid *want_item,
-                           const rm_plan **out);
+remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank,
+                           const rm_lid *want_item, const rm_plan **out);
 /* Move `size` bytes per item: item is indexed by send_item, received is [recv_offset[num_recv]]; buffer is scratch for
  * send_offset[num_send] items. Among neighbours only: returns as soon as this rank has sent and received. */
 remap_status rm_plan_run(const rm_comm *comm, const rm_plan *plan, size_t size, const void *item, void *received, void *buffer);

@@ -2,9 +2,9 @@
  * into chunks that int can count; pairs of ranks with nothing to say exchange nothing.
  *
  * Rank r meets the others in rounds of WINDOW partners: in round k it sends to r + k WINDOW + 0, 1, ... and receives from
- * r - k WINDOW - 0, 1, ..., one chunk each at a time, and then waits. A chunk has the same (round, place in the message) on both
- * sides, so the rank that is furthest behind can always go on and nobody waits for ever. O(data) time besides one exchange of
- * counts; no memory besides what is received. */
+ * r - k WINDOW - 0, 1, ..., one chunk each at a time, and then waits. A chunk has the same (round, place in the message) on
+ * both sides, so the rank that is furthest behind can always go on and nobody waits for ever. O(data) time besides one exchange
+ * of counts; no memory besides what is received. */
 #include "comm/comm_private.h"
 
 #include <string.h>

@@ -7,8 +7,9 @@
  * s + t; sums need equal scales, which is the caller's business. Signs do not depend on the scale, so rm_int_scale can pick the
  * smallest one that fits, where numbers are short and quick.
  *
- * Values are functions of their arguments; nothing is allocated. Cost: O(limbs) for sums, O(limbs a times limbs b) for products;
- * a determinant of coordinates takes about 250 ns. Only the limbs in use are written or read. Shared by geom, moments and cells. */
+ * Values are functions of their arguments; nothing is allocated. Cost: O(limbs) for sums, O(limbs a times limbs b) for
+ * products; a determinant of coordinates takes about 250 ns. Only the limbs in use are written or read. Shared by geom, moments
+ * and cells. */
 #ifndef RM_GEOM_EXACT_H
 #define RM_GEOM_EXACT_H
 
@@ -22,7 +23,8 @@ typedef struct rm_int {
   uint64_t limb[RM_INT_LIMBS]; /* magnitude, least significant first                     */
 } rm_int;
 
-/* The smallest scale at which every coordinate of num points is an integer. RM_INT_SCALE is one for all admitted coordinates. */
+/* The smallest scale at which every coordinate of num points is an integer. RM_INT_SCALE is one for all admitted
+ * coordinates. */
 int rm_int_scale(int num, const double *const xyz[]);
 
 /* *r = x 2^scale, which has to be an integer within RM_INT_BITS. */

@@ -42,7 +42,8 @@ int rm_crossing_order(const double p0[3], const double p1[3], const double s[3][
 /* Parameter of the crossing of edge p0p1 with the triangle's plane, n.(t0 - p0) / (n.u), n.u != 0: relative error of both
  * numerator and denominator at most 2^-50 (evaluated further in double-double when cancellation demands), clamped to [0, 1].
  * A function of the coordinates alone. */
-double rm_crossing_parameter(const double p0[3], const double p1[3], const double t0[3], const double t1[3], const double t2[3]);
+double rm_crossing_parameter(const double p0[3], const double p1[3], const double t0[3], const double t1[3],
+                             const double t2[3]);
 
 /* ---- triangulation of a face (DESIGN 2.1) ------------------------------------------------------------------------ */
 
@@ -52,8 +53,8 @@ enum { RM_CENTRE_POINT = -1 }; /* stands for the mean of the face's vertices in 
  * where the loop starts or which way it runs, and its boundary is the loop, edge by edge. xyz is [n][3]. Of points repeated
  * bitwise: one in a row stays, spikes (b c b) drop out, and where the loop comes back to a point otherwise it is cut into parts
  * of distinct points, each triangulated as a face of its own (or all by one fan). corner, room for 3 (n + 2) ints, receives
- * indices into xyz or RM_CENTRE_POINT, three per triangle, oriented as the input loop; centre receives the mean when it is used.
- * work is scratch of at least 4 n ints. Returns the number of triangles, 0 if no part of 3 vertices is left.
+ * indices into xyz or RM_CENTRE_POINT, three per triangle, oriented as the input loop; centre receives the mean when it is
+ * used. work is scratch of at least 4 n ints. Returns the number of triangles, 0 if no part of 3 vertices is left.
  * Triangle: itself. Exactly coplanar face, or faces == DIAGONAL: as few triangles as possible, shorter diagonal first, ties by
  * coordinates, ears cut off in canonical order where the polygon is concave. CENTRE: fan about the mean, summed in canonical
  * order; if one triangle of the fan runs against the face's area vector or the mean is a vertex, ears as above; if no ear is

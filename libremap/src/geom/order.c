@@ -10,8 +10,8 @@
 #include "geom/geom_private.h"
 #include "geom/grid.h"
 
-/* Forward error of a product of two of meeting's values, relative to the product of their sums of absolute terms: 8 roundings in
- * each factor and a few more. */
+/* Forward error of a product of two of meeting's values, relative to the product of their sums of absolute terms: 8 roundings
+ * in each factor and a few more. */
 static const double ORDER_ERROR = 24 * RM_EPSILON;
 /* Determinants with their rounding errors taken back are good to 2^-95 of the sum of absolute terms, and above this to 2^-50 of
  * themselves. */

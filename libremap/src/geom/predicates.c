@@ -8,8 +8,8 @@
  *   4. the determinant in double-double against its bound (3x3 only): 30 ns;
  *   5. integers of any length (exact.h): 300 ns.
  *
- * Coordinates are multiples of 2^-152 (geom.h), so a product of three differences is 0 or at least 2^-456 and every rounding error
- * in it a multiple of 2^-456: underflow does not occur and the bounds hold as they stand. */
+ * Coordinates are multiples of 2^-152 (geom.h), so a product of three differences is 0 or at least 2^-456 and every rounding
+ * error in it a multiple of 2^-456: underflow does not occur and the bounds hold as they stand. */
 #include "geom/exact.h"
 #include "geom/expansion.h"
 #include "geom/geom_private.h"

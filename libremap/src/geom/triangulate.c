@@ -86,7 +86,8 @@ static inline int turn(const view *v, int a, int b, int c)
   return v->side * rm_cross_sign(v->xyz[a], v->xyz[b], v->xyz[a], v->xyz[c], v->axis);
 }
 
-/* True if vertex i of the part can be cut off: a left turn whose closed triangle holds no other vertex, be it on the diagonal. */
+/* True if vertex i of the part can be cut off: a left turn whose closed triangle holds no other vertex, be it on the
+ * diagonal. */
 static bool is_ear(const view *v, const int *part, int n, int i)
 {
   const int before = i ? i - 1 : n - 1, after = i + 1 < n ? i + 1 : 0;
@@ -287,7 +288,8 @@ static bool walk_precedes(const double (*xyz)[3], const int *loop, int n, walk a
   return false;
 }
 
-/* The first of all walks around the loop: from the smallest vertex towards its smaller neighbour, and on where points repeat. */
+/* The first of all walks around the loop: from the smallest vertex towards its smaller neighbour, and on where points
+ * repeat. */
 static walk canonical_walk(const double (*xyz)[3], const int *loop, int n)
 {
   walk best = {0, 1};
@@ -343,8 +345,8 @@ static int triangulate_polygon(sink *out, int n, remap_faces faces, double centr
   return triangulate_parts(out, &face, faces, centre, kept);
 }
 
-/* A triangle or quadrangle of distinct points, n = 3 or 4, without the general machinery: the same result. Returns -1 if a point
- * is repeated. */
+/* A triangle or quadrangle of distinct points, n = 3 or 4, without the general machinery: the same result. Returns -1 if a
+ * point is repeated. */
 static inline int triangulate_small(sink *out, int n, remap_faces faces, double centre[3])
 {
   const double(*xyz)[3] = out->xyz;

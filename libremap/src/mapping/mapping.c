@@ -4,9 +4,9 @@
  *   (i, j, V, M)  ----->   j | i1 i2 i3 ...       serves source to target
  *        \------------->   i | j1 j2 ...          serves target to source, moments about c_j
  *
- * Each pair travels twice, as one record of 96 bytes, in one exchange per direction; its second moments, where there are any, in
- * another. A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the pairs
- * were made. O(p) time and memory for p pairs. */
+ * Each pair travels twice, as one record of 96 bytes, in one exchange per direction; its second moments, where there are any,
+ * in another. A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the
+ * pairs were made. O(p) time and memory for p pairs. */
 #include "mapping.h"
 
 #include <string.h>
@@ -36,8 +36,8 @@ typedef struct rows_draft {
   double (*giver_centroid)[3];
 } rows_draft;
 
-/* The pairs of a piece as records, grouped by the home of the receiving cell, and their second moments in the same order, NULL if
- * there are none; offset is [comm->size + 1]. */
+/* The pairs of a piece as records, grouped by the home of the receiving cell, and their second moments in the same order, NULL
+ * if there are none; offset is [comm->size + 1]. */
 static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
                                remap_side receiving, int64_t *offset, pair_record **out, double (**out_second)[6])
 {
@@ -148,7 +148,8 @@ static remap_status sort_rows(rm_arena *scratch, rm_keyed *keyed, const rm_frame
   return REMAP_OK;
 }
 
-/* Mark the cells that a skin passes through, and take the records out that are no pairs, with their second moments. Returns how many stay. */
+/* Mark the cells that a skin passes through, and take the records out that are no pairs, with their second moments. Returns how
+ * many stay. */
 static int64_t mark_cut(int64_t n, pair_record *record, double (*second)[6], uint8_t *is_cut)
 {
   int64_t kept = 0;
@@ -162,9 +163,9 @@ static int64_t mark_cut(int64_t n, pair_record *record, double (*second)[6], uin
   return kept;
 }
 
-/* How much of a cell with pairs is covered. A skin that passes through it leaves a part outside, unless what is left is not even
- * rounding of the volume: where zones abut whose faces do not match, the skins of both pass, and cancel. Without a skin the giving
- * mesh winds about the whole cell equally often: once, if it is not tangled and its zones do not overlap there. */
+/* How much of a cell with pairs is covered. A skin that passes through it leaves a part outside, unless what is left is not
+ * even rounding of the volume: where zones abut whose faces do not match, the skins of both pass, and cancel. Without a skin
+ * the giving mesh winds about the whole cell equally often: once, if it is not tangled and its zones do not overlap there. */
 static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_volume, bool is_cut)
 {
   rm_compensated sum = {0.0, 0.0}, rest = {-cell_volume, 0.0};
@@ -178,7 +179,8 @@ static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_vo
   return rint(rm_compensated_value(&sum) / cell_volume) == 1.0 ? REMAP_COVERED : REMAP_PARTIAL;
 }
 
-/* Rows of one side out of the records that came, with their second moments (NULL: none); both are reordered. What stays to be filled in is `same` and the plan. */
+/* Rows of one side out of the records that came, with their second moments (NULL: none); both are reordered. What stays to be
+ * filled in is `same` and the plan. */
 static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame *frame, const rm_mesh *mesh, int64_t n,
                               pair_record *record, double (*second)[6], rows_draft *draft, rm_rows *rows, rm_reason *reason)
 {
@@ -247,11 +249,13 @@ static remap_status bring_home(rm_arena *arena, const rm_comm *comm, const rm_fr
   double(*send_second)[6]  = NULL;
   remap_status status      = REMAP_NO_MEMORY;
 
-  if (send_offset && recv_offset) status = pack_pairs(leaving, comm, part, moments, mesh->side, send_offset, &send, &send_second);
+  if (send_offset && recv_offset)
+    status = pack_pairs(leaving, comm, part, moments, mesh->side, send_offset, &send, &send_second);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send, send_offset, send, recv_offset, &recv));
   if (moments->second)
-    RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send_second, send_offset, send_second, recv_offset, &recv_second));
+    RM_GOTO(done,
+            status = rm_comm_exchange(comm, scratch, sizeof *send_second, send_offset, send_second, recv_offset, &recv_second));
   rm_arena_drop(leaving);
   leaving = NULL;
   status  = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, recv_second, draft, rows, reason);
@@ -264,19 +268,21 @@ done:
   return status;
 }
 
-/* 1 for each covered cell with a single pair that has its volume. (Where no skin passes through a cell, that is its own volume times
- * how often the giving mesh winds about it, an integer, which is not one if cells are tangled.) */
+/* 1 for each covered cell with a single pair that has its volume. (Where no skin passes through a cell, that is its own volume
+ * times how often the giving mesh winds about it, an integer, which is not one if cells are tangled.) */
 static void mark_alone(const rm_mesh *mesh, const rm_rows *rows, uint8_t *alone)
 {
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     const int64_t first = rows->offset[c];
     const double  own   = mesh->cell_volume[c];
 
-    alone[c] = rows->cover[c] == REMAP_COVERED && rows->offset[c + 1] - first == 1 && fabs(rows->volume[first] - own) < fabs(own) / 2;
+    alone[c] =
+        rows->cover[c] == REMAP_COVERED && rows->offset[c + 1] - first == 1 && fabs(rows->volume[first] - own) < fabs(own) / 2;
   }
 }
 
-/* Mark the pairs of cells that cover each other alone: both homes know their half, and the plans carry it across. Collective. */
+/* Mark the pairs of cells that cover each other alone: both homes know their half, and the plans carry it across.
+ * Collective. */
 static remap_status mark_same(const rm_comm *comm, const rm_mesh *const mesh[2], const rm_rows rows[2], rows_draft draft[2])
 {
   rm_arena    *scratch  = rm_arena_new();
@@ -311,8 +317,8 @@ done:
   return status;
 }
 
-/* Where the pairs of a covered cell put its centroid, less where the mesh has it. Far from the origin the latter is rounded to a
- * good part of a cell's size; a slope about it would carry content that the cell does not have. Not collective. */
+/* Where the pairs of a covered cell put its centroid, less where the mesh has it. Far from the origin the latter is rounded to
+ * a good part of a cell's size; a slope about it would carry content that the cell does not have. Not collective. */
 static void find_centroid_errors(const rm_mesh *mesh, const rm_rows *rows, rows_draft *draft)
 {
   for (rm_lid c = 0; c < rows->num_cells; c++) {

@@ -45,17 +45,17 @@ typedef struct rm_mapping {
   rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
 } rm_mapping;
 
-/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the pairs
- * leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
+/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the
+ * pairs leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
 /* What a mask says of a cell: it takes no part; it does; it does, but has no pairs. */
 enum { RM_MASK_OUT = 0, RM_MASK_IN = 1, RM_MASK_BARE = 2 };
 
-/* The same mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving cells] and
- * gives [giving cells], both RM_MASK_IN. Of the receiving side: cells that are OUT are UNWANTED, without pairs; others lose pairs, and
- * are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is left. Collective. Lives in
- * arena and borrows from mapping. O(pairs). */
+/* The same mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving cells]
+ * and gives [giving cells], both RM_MASK_IN. Of the receiving side: cells that are OUT are UNWANTED, without pairs; others lose
+ * pairs, and are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is left.
+ * Collective. Lives in arena and borrows from mapping. O(pairs). */
 remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapping *mapping, remap_side receiving,
                              const uint8_t *wants, const uint8_t *gives, const rm_mapping **out);
 /* Every invariant that one rank can see; slow. Not collective. */
@@ -83,9 +83,9 @@ static inline double rm_row_volume(const rm_rows *rows, rm_lid cell)
   return rm_compensated_value(&sum);
 }
 
-/* Put n cells into canonical order: by the Morton key of the centroid, then centroid, volume and global id, compared in turn; no
- * numbering of a rank takes part. order [n] receives places of the arrays, [n] each. Not collective. Working memory from scratch.
- * NO_MEMORY. O(n). */
+/* Put n cells into canonical order: by the Morton key of the centroid, then centroid, volume and global id, compared in turn;
+ * no numbering of a rank takes part. order [n] receives places of the arrays, [n] each. Not collective. Working memory from
+ * scratch. NO_MEMORY. O(n). */
 remap_status rm_canonical_order(rm_arena *scratch, const rm_frame *frame, int64_t n, const double (*centroid)[3],
                                 const double *volume, const rm_gid *global, rm_lid *order);
 

@@ -1,5 +1,5 @@
-/* mask -- a mapping without the pairs of masked cells. What the cells at the other end of a pair are is asked of their ranks once,
- * one byte per cell. O(pairs) time and memory. */
+/* mask -- a mapping without the pairs of masked cells. What the cells at the other end of a pair are is asked of their ranks
+ * once, one byte per cell. O(pairs) time and memory. */
 #include "mapping.h"
 
 /* Room for what is left of rows. */

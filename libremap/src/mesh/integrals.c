@@ -48,8 +48,8 @@ static inline rm_dd two_product(double a, double b)
   return (rm_dd){product, al * bl - (((product - ah * bh) - al * bh) - ah * bl)};
 }
 
-/* Sum of n <= 2^spare doubles, which does not depend on their order; error below 2^(4 spare - 156) max |x| and its rounding. x is used
- * up. Three bins: each takes the bits of all numbers above its last place, so that their sum is exact. */
+/* Sum of n <= 2^spare doubles, which does not depend on their order; error below 2^(4 spare - 156) max |x| and its rounding. x
+ * is used up. Three bins: each takes the bits of all numbers above its last place, so that their sum is exact. */
 static double sum_binned(double *x, int64_t n)
 {
   double largest = 0.0, bin[3] = {0.0, 0.0, 0.0};
@@ -127,10 +127,11 @@ static int64_t collect(const rm_mesh *mesh, remap_faces faces, rm_lid cell, work
   return num;
 }
 
-/* ---- the two ways ---------------------------------------------------------------------------------------------------------- */
+/* ---- the two ways -------------------------------------------------------------------------------------------------------- */
 
-/* Terms of 24 M along one axis, from those of 6 V: w times the sum of the corners from o. If all w have one sign, their products
- * add up without cancellation and rounded ones will do; else they are kept in double-double. Returns how many there are. */
+/* Terms of 24 M along one axis, from those of 6 V: w times the sum of the corners from o. If all w have one sign, their
+ * products add up without cancellation and rounded ones will do; else they are kept in double-double. Returns how many there
+ * are. */
 static int64_t moment_terms(const triangle *list, int64_t num, const double *volume, double o, int axis, bool one_sign,
                             double *out)
 {
@@ -229,7 +230,7 @@ static void integrate(const double box[6], int64_t num, workspace *w, double *vo
   for (int a = 0; a < 3; a++) centroid[a] = six == 0.0 ? 0.5 * (box[a] + box[a + 3]) : o[a] + moment.x[a] / (4.0 * six);
 }
 
-/* ---- second moments ---------------------------------------------------------------------------------------------------------- */
+/* ---- second moments ------------------------------------------------------------------------------------------------------ */
 
 static rm_dd dd_sum(rm_dd a, rm_dd b)
 {
@@ -245,8 +246,8 @@ static rm_dd dd_product(rm_dd a, rm_dd b)
   return two_sum(product.hi, product.lo + (a.hi * b.lo + a.lo * b.hi));
 }
 
-/* Terms of 120 S along axes x and y, from those of 6 V: w times the sum over corners of x y plus the product of the sums of x and
- * of y, both from o. In double-double: products off the diagonal cancel. Returns how many there are. */
+/* Terms of 120 S along axes x and y, from those of 6 V: w times the sum over corners of x y plus the product of the sums of x
+ * and of y, both from o. In double-double: products off the diagonal cancel. Returns how many there are. */
 static int64_t second_terms(const triangle *list, int64_t num, const double *volume, const double o[3], int x, int y,
                             double *out)
 {
@@ -284,7 +285,7 @@ static void integrate_second(const double centroid[3], int64_t num, workspace *w
         sum_binned(w->moment, second_terms(w->triangle, num, w->volume, centroid, row[k], column[k], w->moment)) / 120.0;
 }
 
-/* ---- all cells --------------------------------------------------------------------------------------------------------------- */
+/* ---- all cells ----------------------------------------------------------------------------------------------------------- */
 
 static remap_status make_workspace(rm_arena *scratch, const rm_mesh *mesh, workspace *w)
 {

@@ -1,10 +1,11 @@
 /* join -- faces that meet, within a rank, across ranks and across zones, found by the coordinates of their nodes.
  *
- * Every loop's hash goes to the rank that the hash names, which answers whether another loop has the same. Only loops that share
- * their hash then travel there with their coordinates, in canonical form: from the smallest node towards the smaller neighbour.
- * Equal loops are one group, and a group is resolved alike whatever the partition: in each zone the loops that run opposite ways
- * are paired, and what is left joins if it is two loops that run opposite ways. A loop that finds no partner is skin.
- * O(corners) time; 8 bytes per face travel, and some 200 bytes for each face that has a partner on another rank or zone. */
+ * Every loop's hash goes to the rank that the hash names, which answers whether another loop has the same. Only loops that
+ * share their hash then travel there with their coordinates, in canonical form: from the smallest node towards the smaller
+ * neighbour. Equal loops are one group, and a group is resolved alike whatever the partition: in each zone the loops that run
+ * opposite ways are paired, and what is left joins if it is two loops that run opposite ways. A loop that finds no partner is
+ * skin. O(corners) time; 8 bytes per face travel, and some 200 bytes for each face that has a partner on another rank or
+ * zone. */
 #include "mesh/mesh_private.h"
 
 #include <stdlib.h>
@@ -273,8 +274,8 @@ static void join_sides(inbox *in, side *a, side *b)
   in->answer[b->place] = local ? in->record[a->place][LOOP] : IS_JOINED;
 }
 
-/* Pair the sides of one zone that run opposite ways: those of different cells first; then the two sides of a cell that has both,
- * which bound nothing. */
+/* Pair the sides of one zone that run opposite ways: those of different cells first; then the two sides of a cell that has
+ * both, which bound nothing. */
 static void pair_in_zone(inbox *in, side *list, int64_t n)
 {
   for (int same_cell = 0; same_cell < 2; same_cell++)
@@ -284,7 +285,8 @@ static void pair_in_zone(inbox *in, side *list, int64_t n)
           join_sides(in, &list[i], &list[k]);
 }
 
-/* Refuse a zone in which more than two cells lie at one loop, not counting cells of no thickness, which have it on both sides. */
+/* Refuse a zone in which more than two cells lie at one loop, not counting cells of no thickness, which have it on both
+ * sides. */
 static remap_status check_zone(const rm_mesh_job *job, const inbox *in, const side *list, int64_t n)
 {
   rm_gid  cell[3];

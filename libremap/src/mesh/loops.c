@@ -1,5 +1,5 @@
-/* loops -- the caller's faces as loops over nodes that are unified by coordinates. O(corners) time by hashing; about 30 bytes per
- * node and 6 per corner of scratch memory. */
+/* loops -- the caller's faces as loops over nodes that are unified by coordinates. O(corners) time by hashing; about 30 bytes
+ * per node and 6 per corner of scratch memory. */
 #include "mesh/mesh_private.h"
 
 #include <math.h>

@@ -47,26 +47,27 @@ typedef struct rm_mesh {
  * counts: they are checked here before anything is read (NULL arrays, negative counts, offsets that do not ascend). */
 remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason);
 
-/* The same in two steps, for meshes of which one moves: the extent of each, -min x, y, z, max x, y, z over all ranks in the caller's
- * unit, all -INFINITY without nodes (collective); and the frame of both extents (not collective). */
-remap_status rm_frame_extent(const rm_comm *comm, remap_side side, const remap_mesh *given, double extent[6], rm_reason *reason);
+/* The same in two steps, for meshes of which one moves: the extent of each, -min x, y, z, max x, y, z over all ranks in the
+ * caller's unit, all -INFINITY without nodes (collective); and the frame of both extents (not collective). */
+remap_status rm_frame_extent(const rm_comm *comm, remap_side side, const remap_mesh *given, double extent[6],
+                             rm_reason *reason);
 void rm_frame_of(const double extent[2][6], rm_frame *out);
 
 /* Check and convert one mesh. Collective. Volumes and centroids depend on coordinates alone, not on numbering. Only nodes that
  * faces use count. Faces meet across ranks and zones by the coordinates of their nodes (an exchange by hash); two faces join if
  * they run opposite ways: first within each zone, then what is left of all zones if it is two faces. More than two cells at one
  * face within one zone is BAD_MESH, not counting cells of no thickness, which lie at it from both sides; across zones all of
- * these faces stay skin. A face given with owner and neighbour stays as it is; two faces of one cell that lie on each other stay
- * two, and are no skin. Also BAD_MESH: index out of range, a face with fewer than 3 nodes as given or with one cell on both
- * sides, an open cell, a cell without faces as given, duplicate or negative global ids, ids given by some ranks only. TOO_LARGE:
- * a count beyond rm_lid. The reason names the cell, the face and the remedy. The product lives in arena. O(n) time, about 60
- * bytes per face corner, 20 of which stay. */
-remap_status rm_mesh_build(rm_arena *arena, const rm_comm *comm, remap_side side, const remap_mesh *given, const rm_frame *frame,
-                           remap_faces faces, const rm_mesh **out, rm_reason *reason);
+ * these faces stay skin. A face given with owner and neighbour stays as it is; two faces of one cell that lie on each other
+ * stay two, and are no skin. Also BAD_MESH: index out of range, a face with fewer than 3 nodes as given or with one cell on
+ * both sides, an open cell, a cell without faces as given, duplicate or negative global ids, ids given by some ranks only.
+ * TOO_LARGE: a count beyond rm_lid. The reason names the cell, the face and the remedy. The product lives in arena. O(n) time,
+ * about 60 bytes per face corner, 20 of which stay. */
+remap_status rm_mesh_build(rm_arena *arena, const rm_comm *comm, remap_side side, const remap_mesh *given,
+                           const rm_frame *frame, remap_faces faces, const rm_mesh **out, rm_reason *reason);
 
-/* Second moments of every cell, integral of (x - c)(x - c)^T with c = cell_centroid: xx, yy, zz, xy, xz, yz. faces is what the mesh
- * was built with. They depend on coordinates alone, with errors below 2^-50 of the largest term. Not collective. *out, [num_cells],
- * lives in arena. NO_MEMORY. About 0.3 us per triangle. */
+/* Second moments of every cell, integral of (x - c)(x - c)^T with c = cell_centroid: xx, yy, zz, xy, xz, yz. faces is what the
+ * mesh was built with. They depend on coordinates alone, with errors below 2^-50 of the largest term. Not collective. *out,
+ * [num_cells], lives in arena. NO_MEMORY. About 0.3 us per triangle. */
 remap_status rm_mesh_second(rm_arena *arena, const rm_mesh *mesh, remap_faces faces, const double (**out)[6]);
 
 /* Every invariant above; slow. Not collective. INTERNAL if one is broken. */

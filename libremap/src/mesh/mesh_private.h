@@ -66,9 +66,11 @@ typedef struct rm_mesh_open {
 remap_status rm_mesh_find_open(rm_arena *scratch, const rm_mesh *mesh, rm_mesh_open *out);
 
 /* Volume and centroid of every cell, [num_cells]. Needs all of mesh but them. Not collective. NO_MEMORY. */
-remap_status rm_mesh_integrals(rm_arena *scratch, const rm_mesh *mesh, remap_faces faces, double *volume, double (*centroid)[3]);
+remap_status rm_mesh_integrals(rm_arena *scratch, const rm_mesh *mesh, remap_faces faces, double *volume,
+                               double (*centroid)[3]);
 
-/* rm_mesh_build with the scratch memory of the caller, which may be NULL: then memory is out. For tests of what happens then. */
+/* rm_mesh_build with the scratch memory of the caller, which may be NULL: then memory is out. For tests of what happens
+ * then. */
 remap_status rm_mesh_build_in(rm_arena *scratch, rm_arena *arena, const rm_comm *comm, remap_side side, const remap_mesh *given,
                               const rm_frame *frame, remap_faces faces, const rm_mesh **out, rm_reason *reason);
 

@@ -25,8 +25,9 @@ typedef struct rm_moments {
 } rm_moments;
 
 /* degree: 1 for volumes and first moments, 2 for second moments too. Not collective. The product lives in arena. O(crossings);
- * pairs whose rounding could exceed 2^-33 of the smaller cell are summed again in double-double; whether those exist whose sum is
- * within its rounding error is decided exactly. */
-remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int degree, const rm_moments **out);
+ * pairs whose rounding could exceed 2^-33 of the smaller cell are summed again in double-double; whether those exist whose sum
+ * is within its rounding error is decided exactly. */
+remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, int degree,
+                              const rm_moments **out);
 
 #endif

@@ -102,8 +102,9 @@ static double surface(const rm_trimesh *m, rm_lid c)
   return area;
 }
 
-static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const candidates *c, remap_faces faces, int64_t num_zones,
-                                   const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason)
+static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const candidates *c, remap_faces faces,
+                                   int64_t num_zones, const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out,
+                                   rm_reason *reason)
 {
   rm_part           part;
   const rm_trimesh *mesh[2];
@@ -122,7 +123,8 @@ static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const
     if (zone_of(num_zones, zone_cell_offset, a) == zone_of(num_zones, zone_cell_offset, b)) continue;
     if (v <= 0x1p-20 * magnitude * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
     const rm_gid low = a < b ? a : b, high = a < b ? b : a;
-    if (v < out->volume || (v == out->volume && (low > out->cell[0] || (low == out->cell[0] && high >= out->cell[1])))) continue;
+    if (v < out->volume || (v == out->volume && (low > out->cell[0] || (low == out->cell[0] && high >= out->cell[1]))))
+      continue;
     *out = (rm_zone_overlap){v, {low, high}};
   }
   return REMAP_OK;
@@ -144,13 +146,15 @@ remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, 
     c.entered  = rm_arena_zero(arena, piece->num_cells, 1);
     c.entering = rm_arena_zero(arena, piece->num_cells, 1);
     status     = zone && c.entered && c.entering ? REMAP_OK : REMAP_NO_MEMORY;
-    for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++) zone[k] = zone_of(num_zones, zone_cell_offset, piece->cell_global[k]);
+    for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++)
+      zone[k] = zone_of(num_zones, zone_cell_offset, piece->cell_global[k]);
     for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++) {
       c.cell = k;
       rm_boxtree_query(mesh->skin_tree, mesh->skin_box, mesh->cell_box[k], mark, &c);
       any |= c.entered[k];
     }
-    if (status == REMAP_OK && any) status = overlay_marked(arena, frame, &c, faces, num_zones, zone_cell_offset, magnitude, out, reason);
+    if (status == REMAP_OK && any)
+      status = overlay_marked(arena, frame, &c, faces, num_zones, zone_cell_offset, magnitude, out, reason);
   }
   rm_arena_drop(arena);
   return status;

@@ -80,7 +80,8 @@ typedef struct rm_cover {
 } rm_cover;
 enum { RM_COVER_CORE = 1, RM_COVER_MET = 2 };
 
-/* keep: REMAP_IN_ bits, of what is made. all: cells of that side count as if each met the other mesh. Collective. Lives in arena. TOO_LARGE as rm_part_build. */
+/* keep: REMAP_IN_ bits, of what is made. all: cells of that side count as if each met the other mesh. Collective. Lives in
+ * arena. TOO_LARGE as rm_part_build. */
 remap_status rm_part_cover(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, int keep, const bool all[2], const rm_cover **out, rm_reason *reason);
 

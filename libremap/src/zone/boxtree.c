@@ -208,7 +208,8 @@ static inline bool segment_meets(const shape *s, const double box[6])
     const int    i = (d + 1) % 3, j = (d + 2) % 3;
     const double hi = fabs(s->half[i]), hj = fabs(s->half[j]);
 
-    if (fabs(t[i] * s->half[j] - t[j] * s->half[i]) > e[i] * hj + e[j] * hi + s->slack * (fabs(t[i]) + fabs(t[j]) + e[i] + e[j] + hi + hj))
+    if (fabs(t[i] * s->half[j] - t[j] * s->half[i]) >
+        e[i] * hj + e[j] * hi + s->slack * (fabs(t[i]) + fabs(t[j]) + e[i] + e[j] + hi + hj))
       return false;
   }
   return true;

@@ -1,5 +1,6 @@
 #!/bin/sh
-# What cannot be chosen, computed or written ends the command like broken files do: see bad_files.sh. See cli.sh for the arguments.
+# What cannot be chosen, computed or written ends the command like broken files do: see bad_files.sh. See cli.sh for the
+# arguments.
 # shellcheck source-path=SCRIPTDIR source=cli.sh
 . "$(dirname "$0")/cli.sh"
 cd "$work" || exit 1

@@ -19,8 +19,8 @@ wrong=0
 cksum "$work"/*.cgns >"$work/inputs"
 
 # Run the command on $1 ranks with the other arguments: its exit status goes to $code, its output to $work/stdout and what the
-# ranks themselves write to standard error, without mpiexec's remarks, to $work/stderr. One rank needs no mpiexec. $wrapper, if it
-# is set, starts each rank.
+# ranks themselves write to standard error, without mpiexec's remarks, to $work/stderr. One rank needs no mpiexec. $wrapper, if
+# it is set, starts each rank.
 run() {
   ranks=$1
   shift

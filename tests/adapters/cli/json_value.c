@@ -2,8 +2,8 @@
  *
  *   ./json_value FILE KEY...
  *
- * The keys lead inwards; a number is a place in an array; without keys the value is the whole file. Objects print their keys, one
- * a line and sorted, arrays their length. The exit status is 1 if there is no such value. */
+ * The keys lead inwards; a number is a place in an array; without keys the value is the whole file. Objects print their keys,
+ * one a line and sorted, arrays their length. The exit status is 1 if there is no such value. */
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>

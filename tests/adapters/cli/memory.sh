@@ -1,5 +1,6 @@
 #!/bin/sh
-# Memory that runs out on one rank ends the command on all of them. See cli.sh for the first arguments; the last is no_memory.so.
+# Memory that runs out on one rank ends the command on all of them. See cli.sh for the first arguments; the last is
+# no_memory.so.
 # shellcheck source-path=SCRIPTDIR source=cli.sh
 . "$(dirname "$0")/cli.sh"
 no_memory=$5

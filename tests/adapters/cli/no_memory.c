@@ -1,5 +1,5 @@
-/* no_memory -- preloaded into a program: requests of 256 KiB and more through aligned_alloc fail. The library's arenas draw their
- * blocks that way, nobody else on the way does. */
+/* no_memory -- preloaded into a program: requests of 256 KiB and more through aligned_alloc fail. The library's arenas draw
+ * their blocks that way, nobody else on the way does. */
 #include <errno.h>
 #include <stddef.h>
 #include <stdlib.h>

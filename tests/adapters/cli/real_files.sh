@@ -1,6 +1,7 @@
 #!/bin/sh
-# Real files: solutions onto other meshes of their case and onto themselves, on one and two ranks. The last argument chooses the case;
-# its data are in the folder REMAP_SHARED_DATA, and what they must give is in MANIFEST.md there. See cli.sh for the other arguments.
+# Real files: solutions onto other meshes of their case and onto themselves, on one and two ranks. The last argument chooses the
+# case; its data are in the folder REMAP_SHARED_DATA, and what they must give is in MANIFEST.md there. See cli.sh for the other
+# arguments.
 # shellcheck source-path=SCRIPTDIR source=cli.sh disable=SC2317 # the cases are called by name
 . "$(dirname "$0")/cli.sh"
 data=${REMAP_SHARED_DATA:-../shared/data}
