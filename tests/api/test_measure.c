@@ -137,6 +137,78 @@ static void statistics_tell_how_volumes_differ(void)
   close_world(&w);
 }
 
+/* One mesh on both sides, numbered and dealt otherwise, with volumes on those of its sides that has_volume says, which agree or
+ * not; returned: a context with an overlay. */
+static remap_context *twice_the_same(tm_mesh *mesh[2], double *volume[2], const bool has_volume[2], bool agrees)
+{
+  tm_mesh       *whole = av_mesh(AV_HEXAHEDRA, 5, 0.03);
+  remap_context *ctx   = NULL;
+  remap_options  options;
+
+  remap_options_default(&options);
+  options.systems = 1;
+  RT_EQ(remap_create(MPI_COMM_WORLD, &options, &ctx), REMAP_OK);
+  for (int side = 0; side < 2; side++) {
+    int *deal = tm_deal(whole, rt_size(), TM_RANDOM, 5 + (uint64_t)side);
+
+    mesh[side]   = tm_part(whole, deal, rt_rank(), 5 + (uint64_t)side);
+    volume[side] = tm_alloc_(mesh[side]->view.num_cells, sizeof(double));
+    for (int64_t c = 0; c < mesh[side]->view.num_cells; c++)
+      volume[side][c] = differs(agrees ? 0 : side, mesh[side]->global[c]) / 125;
+    if (has_volume[side]) mesh[side]->view.cell_volume = volume[side];
+    RT_EQ(remap_set_mesh(ctx, (remap_side)side, &mesh[side]->view), REMAP_OK);
+    free(deal);
+  }
+  tm_free(whole);
+  RT_EQ(remap_build(ctx), REMAP_OK);
+  return ctx;
+}
+
+/* Means are copied whatever the volumes; amounts only where both agree, else their sum is kept. */
+static void check_copies(remap_context *ctx, tm_mesh *const mesh[2], bool agrees, remap_limiter limiter, int in_system)
+{
+  const int64_t          num[2] = {mesh[0]->view.num_cells, mesh[1]->view.num_cells};
+  double                *in = tm_alloc_(num[0], sizeof *in), *mean = tm_alloc_(num[1], sizeof *mean);
+  double                *density  = tm_alloc_(num[1], sizeof *density);
+  const remap_field_desc field[2] = {
+      {.name = "T", .nature = REMAP_VOLUME_MEAN, .in = in, .out = mean},
+      {.name = "rho", .system = in_system, .role = REMAP_ROLE_DENSITY, .in = in, .out = density}};
+  remap_field_report report[2];
+  remap_transfer     how;
+  int64_t            changed = 0;
+
+  remap_transfer_default(&how);
+  how.limiter = limiter;
+  for (int64_t c = 0; c < num[0]; c++) in[c] = 2 + sin((double)mesh[0]->global[c] / 7);
+  RT_EQ(remap_field(ctx, REMAP_FORWARD, &how, 2, field, report), REMAP_OK);
+  RT_CHECK(report[1].conservation_error <= 1e-14);
+  for (int64_t c = 0; c < num[1]; c++) {
+    const double expected = 2 + sin((double)mesh[1]->global[c] / 7);
+
+    RT_CHECK(!(mean[c] < expected || mean[c] > expected));
+    changed += density[c] < expected || density[c] > expected;
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+  RT_CHECK(agrees ? changed == 0 : changed > 100);
+  free(in), free(mean), free(density);
+}
+
+static void amounts_of_same_cells_are_copied_only_if_their_volumes_agree(void)
+{
+  static const bool has_volume[4][2] = {{true, false}, {false, true}, {true, true}, {true, true}};
+
+  for (int k = 0; k < 4; k++) {
+    tm_mesh       *mesh[2];
+    double        *volume[2];
+    remap_context *ctx = twice_the_same(mesh, volume, has_volume[k], k == 3);
+
+    for (int limiter = REMAP_LIMITER_NONE; limiter <= REMAP_LIMITER_CAAS; limiter++)
+      for (int in_system = 0; in_system < 2; in_system++) check_copies(ctx, mesh, k == 3, (remap_limiter)limiter, in_system);
+    remap_destroy(&ctx);
+    for (int side = 0; side < 2; side++) tm_free(mesh[side]), free(volume[side]);
+  }
+}
+
 static void volumes_that_are_none_are_refused(void)
 {
   static const double bad[] = {0, -1, NAN, 1e300};
@@ -158,4 +230,5 @@ static void volumes_that_are_none_are_refused(void)
 }
 
 RT_MAIN(RT_CASE(amounts_are_kept_by_the_solvers_measure), RT_CASE(means_and_velocities_stay_uniform),
-        RT_CASE(statistics_tell_how_volumes_differ), RT_CASE(volumes_that_are_none_are_refused))
+        RT_CASE(statistics_tell_how_volumes_differ),
+        RT_CASE(amounts_of_same_cells_are_copied_only_if_their_volumes_agree), RT_CASE(volumes_that_are_none_are_refused))

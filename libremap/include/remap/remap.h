@@ -192,8 +192,9 @@ typedef struct remap_mesh {
                                       strides: leaves out halo cells; NULL: cell c at place c                */
 
   const double  *cell_volume;    /**< [num_cells] the solver's own volumes, positive, where it integrates otherwise than over
-                                      triangulated faces: CONSERVED fields and systems keep their integrals by them; NULL: those
-                                      of the triangulated cells                            */
+                                      triangulated faces: CONSERVED fields and systems keep their integrals by them, and cells
+                                      that are the same are copied there only if both have one volume; NULL: those of the
+                                      triangulated cells                                   */
 
   const char        *name;             /**< used in messages, say the file's name; may be NULL           */
   int64_t            num_zones;        /**< 0 if the mesh has no zones                                   */

@@ -137,6 +137,7 @@ static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, r
   RM_TRY(stage(ctx, overlay_here(ctx, keeps, passing, magnitude, &crossings, &moments, zones, reason), reason));
   RM_TRY(worst_zone_overlap(ctx, zones, reason));
   RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->place.part, moments, &ctx->mapping, reason));
+  RM_TRY(rm_context_compare_volumes(ctx));
   ctx->stats.seconds_overlay = rm_seconds() - start;
   return fill_stats(ctx, crossings);
 }

@@ -57,6 +57,7 @@ struct remap_context {
   const rm_mesh    *mesh[2];
   rm_layout         layout[2];
   const double     *measure[2]; /* [side][cells] the solver's volume over the own one; NULL: 1 in all cells of all ranks */
+  const double     *given_volume[2]; /* [side][cells] the solver's volume; NULL where measure is */
   double            solver_volume[2], max_volume_difference[2]; /* [side] as in remap_stats */
   rm_gid            worst_volume_cell[2];
   rm_arena         *stencil_arena[2]; /* [side] */
@@ -67,6 +68,7 @@ struct remap_context {
   rm_place          place; /* kept between moves, empty otherwise */
   rm_arena         *arena; /* of the mapping and its views, dropped by the next overlay */
   const rm_mapping *mapping;
+  const uint8_t    *differs[2]; /* [side][cells] as in rm_transfer_setup */
   remap_pairs_view  view[2]; /* made when first needed; row_offset NULL until then */
   remap_stats       stats;
 
@@ -132,6 +134,9 @@ void rm_context_drop_place(remap_context *ctx);
 
 /* Compare the solver's volumes of one side, which lie as given, with those of its mesh. Collective. BAD_MESH. */
 remap_status rm_context_measure(remap_context *ctx, int side, const remap_mesh *given, rm_reason *reason);
+
+/* Find the cells that are the same in both meshes but for the solver's volume. Collective, once there is a mapping. */
+remap_status rm_context_compare_volumes(remap_context *ctx);
 
 /* Forget meshes and their stencils. Not collective. */
 void rm_context_drop_meshes(remap_context *ctx);

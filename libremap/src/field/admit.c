@@ -193,7 +193,7 @@ static void refuse(rm_admission *w, const rm_transfer_setup *setup, const rm_pac
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     uint8_t *refused = w->refused + (int64_t)c * p->num_systems;
 
-    if (!rm_is_mapped(rows->cover[c]) || rows->same[rows->offset[c]]) continue;
+    if (!rm_is_mapped(rows->cover[c]) || rm_is_copied(rows, setup->receiving_differs, c, true)) continue;
     rm_limits_clear(p, limits);
     for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++)
       rm_limits_add(p, got + (int64_t)rows->giver[k] * p->width, limits);

@@ -12,8 +12,8 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   const uint8_t  cover         = rows->cover[cell];
   const int64_t  place_in_pack = (int64_t)cell * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;
 
-  if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover) || rows->same[rows->offset[cell]])
-    return false;
+  if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover)) return false;
+  if (rm_is_copied(rows, w->setup->receiving_differs, cell, rm_is_amount(w->packing, f))) return false;
   if (!(w->setup->receiving->cell_volume[cell] > 0.0)) return false;
   bounds[0] = INFINITY;
   bounds[1] = -INFINITY;

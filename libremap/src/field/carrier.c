@@ -64,7 +64,11 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
 
   RM_NEW(c->kept, arena, num);
   if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, num);
-  c->keeping.ground = (rm_ground){setup->receiving, setup->keeping_stencil, setup->rows, setup->receiving_second, NULL, true};
+  c->keeping.ground = (rm_ground){.mesh       = setup->receiving,
+                                  .stencil    = setup->keeping_stencil,
+                                  .rows       = setup->rows,
+                                  .second     = setup->receiving_second,
+                                  .is_keeping = true};
   c->keeping.given  = c->kept;
   return rm_profile_init(arena, (int)setup->giving->side, &c->load, &c->keeping);
 }
@@ -86,8 +90,12 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->count, arena, NUM_COUNTS * (int64_t)n);
   RM_NEW(c->fields, arena, n);
-  c->giving.ground =
-      (rm_ground){setup->giving, setup->giving_stencil, setup->giving_rows, setup->giving_second, setup->giving_measure, false};
+  c->giving.ground = (rm_ground){.mesh    = setup->giving,
+                                 .stencil = setup->giving_stencil,
+                                 .rows    = setup->giving_rows,
+                                 .second  = setup->giving_second,
+                                 .measure = setup->giving_measure,
+                                 .differs = setup->giving_differs};
   c->giving.given = c->given;
   RM_TRY(rm_profile_init(arena, stream, &c->load, &c->giving));
   if (c->load.is_blended) RM_TRY(make_keeping(arena, c));

@@ -60,6 +60,8 @@ typedef struct rm_transfer_setup {
   const double (*giving_second)[6];    /* rm_mesh_second; NULL unless systems have slopes              */
   const double (*receiving_second)[6]; /* likewise; NULL unless such slopes, or order 3, go beyond what is covered */
   const double *giving_measure, *receiving_measure; /* [cells] the solver's volumes over those of the mesh; NULL: 1   */
+  /* [cells] 1: the cell and its giver are the same, but not their volumes for the solver: amounts are no copies; NULL: none */
+  const uint8_t *giving_differs, *receiving_differs;
   bool          any_partial, any_uncovered;         /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 

@@ -105,6 +105,12 @@ static inline bool rm_is_amount(const rm_packing *packing, int f)
   return packing->system_of[f] >= 0 || packing->fields[f].nature == REMAP_CONSERVED;
 }
 
+/* Is what a mapped cell has of a field, amounts or not, that of the only cell that it shares volume with, as it is? */
+static inline bool rm_is_copied(const rm_rows *rows, const uint8_t *differs, rm_lid cell, bool is_amount)
+{
+  return rows->same[rows->offset[cell]] && !(is_amount && differs && differs[cell]);
+}
+
 /* Do receiving cells need bounds: all (CAAS, systems), or those in part covered that a reconstruction is taken beyond? */
 bool rm_needs_bounds(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
 
@@ -172,6 +178,7 @@ typedef struct rm_ground {
   const rm_rows    *rows;    /* of its cells                                                               */
   const double (*second)[6]; /* rm_mesh_second; NULL unless systems have slopes                            */
   const double *measure;     /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
+  const uint8_t *differs;    /* [cells] as in rm_transfer_setup                                            */
   bool          is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
 } rm_ground;
 

@@ -63,6 +63,11 @@ static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
   return (row_sums){rm_compensated_value(&content), rm_compensated_value(&volume), magnitude};
 }
 
+static bool is_copied(const rm_receipt *w, int f, rm_lid cell)
+{
+  return rm_is_copied(w->setup->rows, w->setup->receiving_differs, cell, rm_is_amount(w->packing, f));
+}
+
 /* The solver's volume of a cell over that of the mesh, for amounts. */
 static double measure_of(const rm_receipt *w, int f, rm_lid cell)
 {
@@ -222,13 +227,12 @@ static rm_integral *integral_of(const rm_receipt *w, int f) { return w->integral
 static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
 {
   const rm_rows *rows     = w->setup->rows;
-  const int64_t  first    = rows->offset[cell];
   rm_integral   *integral = integral_of(w, f);
   row_sums       s;
   double         copied;
 
   if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
-  if (!rows->same[first]) {
+  if (!is_copied(w, f, cell)) {
     s = sum_row(w, f, cell);
     if (!is_normalised(w, f, cell)) {
       const double kept = is_blend(w, f, cell) ? kept_content(w, f, cell, old, &s) : 0.0;
@@ -238,7 +242,7 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
     if (integral) rm_integral_add(&integral->minus_target, -1.0, s.content); /* of its covered part: it has no other */
     return normalised(w, f, cell, &s) / measure_of(w, f, cell) / RM_VALUE_SCALE;
   }
-  copied = w->got[(int64_t)rows->giver[first] * w->packing->width + w->packing->at[f]];
+  copied = w->got[(int64_t)rows->giver[rows->offset[cell]] * w->packing->width + w->packing->at[f]];
   if (integral)
     rm_integral_add(&integral->minus_target, -RM_VALUE_SCALE * copied * measure_of(w, f, cell),
                     w->setup->receiving->cell_volume[cell]);
@@ -302,22 +306,22 @@ static void receive_system(const rm_receipt *w, int system, rm_lid cell, double 
 {
   const rm_packing *p       = w->packing;
   const rm_rows    *rows    = w->setup->rows;
-  const int64_t     first   = rows->offset[cell];
   const int         density = p->system[system].density;
-  const double     *given   = w->got + (int64_t)rows->giver[first] * p->width;
+  const bool        copies  = is_copied(w, density, cell);
+  const double     *given   = w->got + (int64_t)rows->giver[rows->offset[cell]] * p->width;
   double           *kept    = w->room + 4 * p->num_fields;
 
-  if (!rows->same[first] && is_normalised(w, density, cell)) {
+  if (!copies && is_normalised(w, density, cell)) {
     normalise_system(w, system, cell, value);
     return;
   }
   for (int f = 0; f < p->num_fields; f++) kept[f] = 0.0;
-  if (!rows->same[first] && is_blend(w, density, cell)) keep_system(w, system, cell, value, kept);
+  if (!copies && is_blend(w, density, cell)) keep_system(w, system, cell, value, kept);
   for (int f = 0; f < p->num_fields; f++) {
     row_sums s;
 
     if (p->system_of[f] != system) continue;
-    if (rows->same[first]) {
+    if (copies) {
       value[f] = given[p->at[f]];
       continue;
     }
@@ -358,7 +362,7 @@ void rm_receive(const rm_receipt *w)
     if (rows->cover[c] == REMAP_UNCOVERED) continue;
     for (int s = 0; s < w->packing->num_systems; s++) receive_system(w, s, c, value);
     if (w->packing->num_systems == 0) continue;
-    if (rows->same[rows->offset[c]])
+    if (rm_is_copied(rows, w->setup->receiving_differs, c, true))
       integrate_copies(w, c, value);
     else
       rm_system_restore(w->packing, value);

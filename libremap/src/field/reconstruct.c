@@ -255,7 +255,8 @@ void rm_reconstruct(const rm_profile *w, const rm_packing *packing, uint8_t whic
   for (rm_lid c = 0; c < w->ground.mesh->num_cells; c++) { /* cells first: their weights are read once for all fields */
     const double *given = w->given + (int64_t)c * num, *number = w->number + (int64_t)c * num;
     double       *place = w->pack + (int64_t)c * packing->width;
-    const bool    asked = is_asked(&w->ground, rows->cover[c]), is_same = asked && rows->same[rows->offset[c]];
+    const bool    asked = is_asked(&w->ground, rows->cover[c]);
+    const bool    is_same = asked && rm_is_copied(rows, w->ground.differs, c, true);
 
     if (w->needs_halo[c] != which) continue;
     for (int f = 0; f < num; f++) {
