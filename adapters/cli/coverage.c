@@ -61,11 +61,12 @@ static void merge(const cli_job *j, const cli_cover_row *mine, cli_cover_row *ro
 
 static cli_exit find_side(cli_job *j, remap_side side, const cell_facts *facts, cli_failure *why)
 {
-  const int     shift    = 60 - ilogb(j->report.stats.volume[side]);
   int64_t       whole[4] = {0, 0, 0, 0};
   cli_cover_row mine = {.num_partial = 0}, *rows, *out = &j->report.cover[side];
-  int           ranks;
+  int           ranks, exponent, shift;
 
+  frexp(j->report.stats.volume[side], &exponent); /* the volume may be 0: a mesh that is tiny beside the other */
+  shift = 61 - exponent;
   MPI_Comm_size(j->comm, &ranks);
   rows = calloc((size_t)ranks, sizeof *rows);
   CLI_TRY(cli_agree(j, rows ? CLI_DONE : cli_no_memory(why), why));

@@ -39,6 +39,12 @@ alike cgns "1 2 3 4" union good.cgns half.cgns
 alike vtu "1 4" union good.cgns dice.obj
 alike obj "1 2" difference good.cgns half.cgns
 hold "$wrong" "the bytes do not depend on the number of ranks"
+for n in 1 3; do
+  works "$n" rdifference good.cgns half.cgns -o out.cgns --report report.json
+  value result volume >"volume$n"
+done
+cmp -s volume1 volume3 || complain "$(cat volume1) and $(cat volume3)"
+hold "$wrong" "nor do the volumes of the report"
 
 works 1 imprint good.cgns half.cgns -o out.cgns -f 'Dens*' --report report.json
 [ "$(value result fields 0)" = Density ] || complain "no Density"

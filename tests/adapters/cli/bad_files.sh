@@ -20,6 +20,8 @@ refused 5 no_coordinates.cgns "missing coordinates are refused" no_coordinates.c
 refused 6 "nan_coordinate.cgns.*Zone" "a coordinate that is NaN is refused" nan_coordinate.cgns mesh.cgns -o out/result.cgns
 refused 6 "far_node.cgns.*Zone.*cell 8" "a node number out of range is refused" good.cgns far_node.cgns -o out/result.cgns
 refused 6 "volumes" "a unit in which volumes are no numbers is refused" good.cgns mesh.cgns --scale 1e308 -o out/result.cgns
+refused 3 "units" "a mesh too small to have volumes beside the other is refused" \
+  good.cgns mesh.cgns --scale 1e-40 -o out/result.cgns
 refused 6 "open_cell.cgns.*Zone.*cell 1" "an open cell is refused" good.cgns open_cell.cgns -o out/result.cgns
 refused 6 "three_cells.cgns.*Zone.*face 1" "a face of three cells is refused" good.cgns three_cells.cgns -o out/result.cgns
 refused 6 "zones_overlap.cgns.*Zone.*Second" "zones that overlap are named" good.cgns zones_overlap.cgns -o out/result.cgns
