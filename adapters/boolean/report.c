@@ -18,8 +18,8 @@ static int kind_of(const remap_supermesh_view *view, int64_t cell)
   return view->cell_ancestor[0][cell] < 0 ? 2 : view->cell_ancestor[1][cell] < 0;
 }
 
-/* The volume of each kind, with the same digits on any number of ranks. Each volume is cut into three whole numbers of 30 bits, in
- * units of about 2^-30, 2^-60, 2^-90 of the largest: these add up alike in any order. Smaller digits are left out. */
+/* The volume of each kind, with the same digits on any number of ranks. Each volume is cut into three whole numbers of 30 bits,
+ * in units of about 2^-30, 2^-60, 2^-90 of the largest: these add up alike in any order. Smaller digits are left out. */
 static void sum_volumes(MPI_Comm comm, const remap_supermesh_view *view, double volume[3])
 {
   int64_t sum[3][3] = {{0}};
