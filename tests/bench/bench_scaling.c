@@ -1,6 +1,6 @@
-/* bench_scaling -- what a remap_build and a remap_field cost a rank besides computing: messages, partners, bytes and collective calls,
- * counted between the library and MPI, and memory. One JSON line; the largest over the ranks of each. The meshes are those of
- * tests/support/balance.h, dealt in slabs, or at random if RANDOM is given.
+/* bench_scaling -- what a remap_build and a remap_field cost a rank besides computing: messages, partners, bytes and collective
+ * calls, counted between the library and MPI, and memory. One JSON line; the largest over the ranks of each. The meshes are
+ * those of tests/support/balance.h, dealt in slabs, or at random if RANDOM is given.
  *
  *   mpirun -n P bench_scaling CASE N [RANDOM] */
 #include <remap/remap.h>
@@ -127,11 +127,12 @@ int main(int argc, char **argv)
   if (status == REMAP_OK) status = remap_get_stats(ctx, &stats);
   PMPI_Allreduce(MPI_IN_PLACE, out, 12, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
   if (rank == 0 && status == REMAP_OK)
-    printf("{\"bench\":\"scaling\",\"case\":\"%s\",\"dealt\":\"%s\",\"ranks\":%d,\"cells\":%lld,\"pairs\":%lld,\"build\":{\"messages\":%.0f,"
-           "\"bytes\":%.0f,\"partners\":%.0f,\"collectives\":%.0f,\"collective_bytes\":%.0f,\"peak_bytes\":%.0f,\"kept_bytes\":%.0f},"
+    printf("{\"bench\":\"scaling\",\"case\":\"%s\",\"dealt\":\"%s\",\"ranks\":%d,\"cells\":%lld,\"pairs\":%lld,\"build\":{"
+           "\"messages\":%.0f,\"bytes\":%.0f,\"partners\":%.0f,\"collectives\":%.0f,\"collective_bytes\":%.0f,"
+           "\"peak_bytes\":%.0f,\"kept_bytes\":%.0f},"
            "\"field\":{\"messages\":%.0f,\"bytes\":%.0f,\"partners\":%.0f,\"collectives\":%.0f}}\n",
-           argv[1], argc > 3 ? "random" : "slabs", size, (long long)cells, (long long)stats.pairs, out[0], out[1], out[2], out[3],
-           out[4], out[10], out[11], out[5], out[6], out[7], out[8]);
+           argv[1], argc > 3 ? "random" : "slabs", size, (long long)cells, (long long)stats.pairs, out[0], out[1], out[2],
+           out[3], out[4], out[10], out[11], out[5], out[6], out[7], out[8]);
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
   MPI_Finalize();

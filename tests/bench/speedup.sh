@@ -1,7 +1,7 @@
 #!/bin/sh
-# speedup.sh -- how much faster two ranks overlay than one: wall clock of the stages behind the partition, and of all of remap_build, on
-# general and on graded meshes, N^3 to (N+1)^3. Runs with one rank and with two take turns, RUNS times; medians. Prints a table in
-# Markdown. Wants two idle cores; the last column, from counts and processor time of the ranks alone, does not.
+# speedup.sh -- how much faster two ranks overlay than one: wall clock of the stages behind the partition, and of all of
+# remap_build, on general and on graded meshes, N^3 to (N+1)^3. Runs with one rank and with two take turns, RUNS times; medians.
+# Prints a table in Markdown. Wants two idle cores; the last rows, from counts and processor time of the ranks alone, do not.
 #
 #   tests/bench/speedup.sh BUILD [N] [RUNS] [diagonal|centre]
 #
@@ -43,6 +43,6 @@ for case in even graded; do # of both ranks together; the slower one has a half 
     "$(awk -v a="$(of balance-$case-2 cpu_overlay)" -v r="$(of balance-$case-2 cpu)" 'BEGIN { print a * r / 2 }')"
   row "bench_balance $case, crossings and triangles of the slower rank" \
     "$(awk -v a="$(of balance-$case-1 all_crossings)" -v b="$(of balance-$case-1 all_triangles)" 'BEGIN { print a + b }')" \
-    "$(awk -v a="$(of balance-$case-2 all_crossings)" -v b="$(of balance-$case-2 all_triangles)" -v r="$(of balance-$case-2 work)" \
-      'BEGIN { print (a + b) * r / 2 }')"
+    "$(awk -v a="$(of balance-$case-2 all_crossings)" -v b="$(of balance-$case-2 all_triangles)" \
+      -v r="$(of balance-$case-2 work)" 'BEGIN { print (a + b) * r / 2 }')"
 done

@@ -122,7 +122,8 @@ static remap_status keep_neighbours(rm_arena *arena, int num_ranks, const int64_
 }
 
 /* The plan out of how much is wanted of each rank, and by each. Not collective. */
-static remap_status shorten(rm_arena *arena, int num_ranks, const int64_t *recv_offset, const int64_t *send_offset, rm_plan *plan)
+static remap_status shorten(rm_arena *arena, int num_ranks, const int64_t *recv_offset, const int64_t *send_offset,
+                            rm_plan *plan)
 {
   RM_TRY(keep_neighbours(arena, num_ranks, recv_offset, &plan->num_recv, &plan->recv_rank, &plan->recv_offset));
   RM_TRY(keep_neighbours(arena, num_ranks, send_offset, &plan->num_send, &plan->send_rank, &plan->send_offset));
