@@ -105,6 +105,7 @@ static inline double bench_heap_start(void)
   bench_heap_peak_ = bench_heap_now_;
   return (double)bench_heap_now_;
 }
+/* Bytes held now, and the most since bench_heap_start. */
 static inline double bench_heap_now(void) { return (double)bench_heap_now_; }
 static inline double bench_heap_peak(void) { return (double)bench_heap_peak_; }
 #endif
@@ -142,6 +143,7 @@ static inline void bench_thin_(double xyz[3], const void *data)
   xyz[2] *= 1e-4;
 }
 
+/* As tm_tetrahedra and tm_dual. */
 typedef tm_mesh *bench_maker_(const int n[3], tm_map map, const void *data);
 
 /* N^3 hexahedra on M^3, warped differently, then moved by a map (NULL: stay). */

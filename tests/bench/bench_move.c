@@ -65,6 +65,19 @@ static remap_status timed(remap_context *ctx, const double *matrix, double *cons
   return status;
 }
 
+/* seconds, [5][steps]: of remap_move, of a fresh build, of both with their first transfers, of one more transfer. */
+static void print(int size, const int64_t cells[2], const remap_stats *stats, int steps, double *seconds)
+{
+  const double a = median(seconds, steps), b = median(seconds + steps, steps);
+  const double c = median(seconds + 2 * steps, steps), d = median(seconds + 3 * steps, steps);
+
+  printf("{\"bench\":\"move\",\"ranks\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,\"steps\":%d,\"seconds_move\":%.4f,"
+         "\"seconds_build\":%.4f,\"share\":%.3f,\"seconds_step_move\":%.4f,\"seconds_step_build\":%.4f,\"share_step\":%.3f,"
+         "\"seconds_partition\":%.4f,\"seconds_overlay\":%.4f,\"seconds_field\":%.5f}\n",
+         size, (long long)cells[0], (long long)cells[1], (long long)stats->pairs, steps, a, b, a / b, c, d, c / d,
+         stats->seconds_partition, stats->seconds_overlay, median(seconds + 4 * steps, steps));
+}
+
 int main(int argc, char **argv)
 {
   int rank, size;
@@ -123,15 +136,7 @@ int main(int argc, char **argv)
   }
   if (status == REMAP_OK) status = remap_get_stats(moving, &stats);
   if (status != REMAP_OK && rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(moving));
-  if (status == REMAP_OK && rank == 0) {
-    const double a = median(move, steps), b = median(fresh, steps), c = median(move_all, steps), d = median(fresh_all, steps);
-
-    printf("{\"bench\":\"move\",\"ranks\":%d,\"cells\":[%lld,%lld],\"pairs\":%lld,\"steps\":%d,\"seconds_move\":%.4f,"
-           "\"seconds_build\":%.4f,\"share\":%.3f,\"seconds_step_move\":%.4f,\"seconds_step_build\":%.4f,\"share_step\":%.3f,"
-           "\"seconds_partition\":%.4f,\"seconds_overlay\":%.4f,\"seconds_field\":%.5f}\n",
-           size, (long long)cells[0], (long long)cells[1], (long long)stats.pairs, steps, a, b, a / b, c, d, c / d,
-           stats.seconds_partition, stats.seconds_overlay, median(field, steps));
-  }
+  if (status == REMAP_OK && rank == 0) print(size, cells, &stats, steps, move);
   remap_destroy(&moving), remap_destroy(&anew);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
   free(q[0]), free(q[1]), free(xyz), free(move);
