@@ -293,9 +293,11 @@ static cli_exit run(cli_job *j, cli_failure *why)
   CLI_TRY(build(j, why));
   if (speaks) cli_report_overlap(stdout, &j->report);
   if (speaks) cli_report_cover(stdout, &j->report);
-  if (j->options.check) verified = verify(j, why);
-  if (j->options.check && verified == CLI_DONE) verified = cli_check(j, why);
-  if (j->options.check) return report_even_if(j, verified, why);
+  if (j->options.check) {
+    verified = verify(j, why);
+    if (verified == CLI_DONE) verified = cli_check(j, why);
+    return report_even_if(j, verified, why);
+  }
   CLI_TRY(transfer(j, why));
   if (speaks) cli_report_fields(stdout, &j->report);
   verified = verify(j, why);

@@ -174,6 +174,7 @@ typedef struct remap_options {
  *  A face is a loop of nodes, its normal (by the right-hand rule) pointing out of face_owner. A face between cells of two
  *  ranks, or of two zones, is given once by each, with neighbour -1: faces join by the coordinates of their nodes. Nodes
  *  are shared or repeated as the caller likes. Coordinates are finite; a face has at least 3 nodes; every cell is closed.
+ *  Coordinates below 2^-100, about 1e-30, of the largest coordinate of both meshes count as 0.
  *
  *  What is not set is 0 and NULL: index_base 0 and 64-bit indices then. */
 typedef struct remap_mesh {
