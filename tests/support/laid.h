@@ -144,30 +144,43 @@ static inline void laid_add_face_(laid_maker_ *k, const int64_t *node, int n, rm
   k->num_faces++;
 }
 
+/* Add the faces of the cells that have a place, in shuffled order: those between two senders once for each. */
+static inline void laid_faces_(laid_maker_ *k, const rm_lid *place)
+{
+  const rm_lid   faces = (rm_lid)k->m->view.num_faces;
+  const uint8_t *skin  = laid_skin_(k->l->arena, k->m);
+  rm_lid        *order = laid_get_(k->l->arena, faces, sizeof *order);
+  int64_t       *loop  = laid_get_(k->l->arena, k->m->face_offset[faces], sizeof *loop);
+
+  laid_permute_(order, faces, &k->seed);
+  for (rm_lid i = 0; i < faces; i++) {
+    const rm_lid  f   = order[i];
+    const int     len = laid_loop_(k->m, f, loop);
+    const int64_t a = k->m->owner[f], b = k->m->neighbour[f];
+    const rm_lid  owner = place[a], neighbour = b < 0 ? -1 : place[b];
+
+    if (len < 3) continue;
+    if (owner >= 0 && neighbour >= 0 && k->sender[a] == k->sender[b]) {
+      laid_add_face_(k, loop, len, owner, neighbour, k->sender[a], skin[f]);
+    } else {
+      if (owner >= 0) laid_add_face_(k, loop, len, owner, -1, k->sender[a], skin[f]);
+      if (neighbour >= 0) laid_add_face_(k, loop, len, -1, neighbour, k->sender[b], skin[f]);
+    }
+  }
+}
+
 static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_how *how)
 {
   const rm_lid   num = (rm_lid)m->view.num_cells, faces = (rm_lid)m->view.num_faces;
   const int64_t  corners = m->face_offset[faces];
-  const uint8_t *skin = laid_skin_(l->arena, m), *keep = how->keep[side];
-  rm_lid        *order = laid_get_(l->arena, faces, sizeof *order), *cells = laid_get_(l->arena, num, sizeof *cells), n = 0;
-  int64_t       *loop = laid_get_(l->arena, corners, sizeof *loop);
-  laid_maker_    k    = {l,
-                         m,
-                   how->shuffle ? how->shuffle + (uint64_t)side : 0,
-                   how->shuffle && how->senders > 1 ? how->senders : 1,
-                         NULL,
-                         NULL,
-                         NULL,
-                         NULL,
-                         NULL,
-                         NULL,
-                         NULL,
-                         0,
-                         0};
+  const uint8_t *keep = how->keep[side];
+  rm_lid        *cells = laid_get_(l->arena, num, sizeof *cells), n = 0;
+  laid_maker_    k    = {.l = l, .m = m, .senders = how->shuffle && how->senders > 1 ? how->senders : 1};
   rm_gid        *global;
   rm_lid        *home;
   int           *rank;
 
+  k.seed         = how->shuffle ? how->shuffle + (uint64_t)side : 0;
   k.sender       = laid_get_(l->arena, num, sizeof *k.sender);
   k.node_of      = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.node_of);
   k.xyz          = laid_get_(l->arena, k.senders * m->view.num_nodes, sizeof *k.xyz);
@@ -193,21 +206,7 @@ static inline void laid_piece_(laid *l, const tm_mesh *m, int side, const laid_h
     rank[n]           = k.sender[c];
     l->place[side][c] = n++;
   }
-  laid_permute_(order, faces, &k.seed);
-  for (rm_lid i = 0; i < faces; i++) {
-    const rm_lid  f   = order[i];
-    const int     len = laid_loop_(m, f, loop);
-    const int64_t a = m->owner[f], b = m->neighbour[f];
-    const rm_lid  owner = l->place[side][a], neighbour = b < 0 ? -1 : l->place[side][b];
-
-    if (len < 3) continue;
-    if (owner >= 0 && neighbour >= 0 && k.sender[a] == k.sender[b]) {
-      laid_add_face_(&k, loop, len, owner, neighbour, k.sender[a], skin[f]);
-    } else {
-      if (owner >= 0) laid_add_face_(&k, loop, len, owner, -1, k.sender[a], skin[f]);
-      if (neighbour >= 0) laid_add_face_(&k, loop, len, -1, neighbour, k.sender[b], skin[f]);
-    }
-  }
+  laid_faces_(&k, l->place[side]);
   l->part.piece[side] = (rm_piece){.num_nodes      = k.num_nodes,
                                    .num_faces      = k.num_faces,
                                    .num_cells      = n,
