@@ -44,23 +44,38 @@ static giver_view view(const rm_receipt *w, int f, rm_lid giver)
                       w->packing->degree[f] > 1 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
 }
 
-static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell)
+/* What all fields share: no content. */
+static row_sums measure_row(const rm_rows *rows, rm_lid cell)
 {
-  const rm_rows *rows    = w->setup->rows;
-  rm_compensated content = {0.0, 0.0}, volume = {0.0, 0.0};
+  rm_compensated volume    = {0.0, 0.0};
   double         magnitude = 0.0;
 
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const giver_view g = view(w, f, rows->giver[k]);
-    const double    *m = rows->moment[k];
-
-    rm_compensated_add(&content, g.value * rows->volume[k]);
-    rm_compensated_add(&content, g.slope[0] * m[0] + g.slope[1] * m[1] + g.slope[2] * m[2]);
-    if (g.curvature) rm_compensated_add(&content, rm_dot6(g.curvature, rows->second[k]) + g.curvature[6] * rows->volume[k]);
     rm_compensated_add(&volume, rows->volume[k]);
     magnitude += fabs(rows->volume[k]);
   }
-  return (row_sums){rm_compensated_value(&content), rm_compensated_value(&volume), magnitude};
+  return (row_sums){0.0, rm_compensated_value(&volume), magnitude};
+}
+
+/* row: as measured. */
+static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell, const row_sums *row)
+{
+  const rm_rows *rows    = w->setup->rows;
+  const int      degree  = w->packing->degree[f];
+  rm_compensated content = {0.0, 0.0};
+
+  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
+    const giver_view g = view(w, f, rows->giver[k]);
+
+    rm_compensated_add(&content, g.value * rows->volume[k]);
+    if (degree > 0) {
+      const double *m = rows->moment[k];
+
+      rm_compensated_add(&content, g.slope[0] * m[0] + g.slope[1] * m[1] + g.slope[2] * m[2]);
+    }
+    if (degree > 1) rm_compensated_add(&content, rm_dot6(g.curvature, rows->second[k]) + g.curvature[6] * rows->volume[k]);
+  }
+  return (row_sums){rm_compensated_value(&content), row->volume, row->magnitude};
 }
 
 static bool is_copied(const rm_receipt *w, int f, rm_lid cell)
@@ -224,7 +239,7 @@ static double receive_flag(const rm_receipt *w, int f, rm_lid cell)
 static rm_integral *integral_of(const rm_receipt *w, int f) { return w->integral ? &w->integral[f] : NULL; }
 
 /* The new value of a mapped cell outside of systems; old is the one it has. */
-static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
+static double receive(const rm_receipt *w, int f, rm_lid cell, const row_sums *row, double old)
 {
   const rm_rows *rows     = w->setup->rows;
   rm_integral   *integral = integral_of(w, f);
@@ -233,7 +248,7 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
 
   if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
   if (!is_copied(w, f, cell)) {
-    s = sum_row(w, f, cell);
+    s = sum_row(w, f, cell, row);
     if (!is_normalised(w, f, cell)) {
       const double kept = is_blend(w, f, cell) ? kept_content(w, f, cell, old, &s) : 0.0;
 
@@ -250,7 +265,7 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, double old)
 }
 
 /* Amounts of a system, normalised: taken to the whole cell as far as the state can be. value receives them. */
-static void normalise_system(const rm_receipt *w, int system, rm_lid cell, double *value)
+static void normalise_system(const rm_receipt *w, int system, rm_lid cell, const row_sums *row, double *value)
 {
   const rm_packing *p      = w->packing;
   const rm_rows    *rows   = w->setup->rows;
@@ -266,7 +281,7 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, doubl
 
     mean[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s       = sum_row(w, f, cell);
+    s       = sum_row(w, f, cell, row);
     mean[f] = is_void_row(w, cell, &s) ? plain_mean(w, f, cell, &s) : s.content / s.volume;
     if (p->degree[f] > 0 && !is_void_row(w, cell, &s)) change[f] = mean_taken_beyond(w, f, cell, &s) - mean[f];
     if (w->integral) rm_integral_add(&w->integral[f].minus_target, -1.0, s.content);
@@ -277,7 +292,7 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, doubl
 }
 
 /* The old content of a system, its slopes scaled until it is a state that can be. kept receives it, scaled. */
-static void keep_system(const rm_receipt *w, int system, rm_lid cell, const double *old, double *kept)
+static void keep_system(const rm_receipt *w, int system, rm_lid cell, const row_sums *row, const double *old, double *kept)
 {
   const rm_packing *p      = w->packing;
   const int         num    = p->num_fields;
@@ -289,7 +304,7 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const doub
 
     kept[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s = sum_row(w, f, cell);
+    s = sum_row(w, f, cell, row);
     add_kept(w, f, cell, old[f], &s, &kept[f], &change[f]);
     volume = w->setup->receiving->cell_volume[cell] - s.volume;
   }
@@ -302,7 +317,7 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const doub
 }
 
 /* The new values of a system in a mapped cell: amounts, to be converted, but for copies. */
-static void receive_system(const rm_receipt *w, int system, rm_lid cell, double *value)
+static void receive_system(const rm_receipt *w, int system, rm_lid cell, const row_sums *row, double *value)
 {
   const rm_packing *p       = w->packing;
   const rm_rows    *rows    = w->setup->rows;
@@ -312,11 +327,11 @@ static void receive_system(const rm_receipt *w, int system, rm_lid cell, double 
   double           *kept    = w->room + 4 * p->num_fields;
 
   if (!copies && is_normalised(w, density, cell)) {
-    normalise_system(w, system, cell, value);
+    normalise_system(w, system, cell, row, value);
     return;
   }
   for (int f = 0; f < p->num_fields; f++) kept[f] = 0.0;
-  if (!copies && is_blend(w, density, cell)) keep_system(w, system, cell, value, kept);
+  if (!copies && is_blend(w, density, cell)) keep_system(w, system, cell, row, value, kept);
   for (int f = 0; f < p->num_fields; f++) {
     row_sums s;
 
@@ -325,7 +340,7 @@ static void receive_system(const rm_receipt *w, int system, rm_lid cell, double 
       value[f] = given[p->at[f]];
       continue;
     }
-    s        = sum_row(w, f, cell);
+    s        = sum_row(w, f, cell, row);
     value[f] = receive_content(w, f, cell, value[f], kept[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
   }
 }
@@ -350,17 +365,18 @@ void rm_receive(const rm_receipt *w)
   const int      num  = w->packing->num_fields;
 
   for (rm_lid c = 0; c < rows->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
-    double *value = w->value + (int64_t)c * num;
+    const row_sums row   = measure_row(rows, c);
+    double        *value = w->value + (int64_t)c * num;
 
     if (rows->cover[c] == REMAP_UNWANTED) continue;
     for (int f = 0; f < num; f++) {
       if (rows->cover[c] == REMAP_UNCOVERED)
         value[f] = rm_keeps_old(w->how, &w->fields[f], REMAP_UNCOVERED) ? value[f] : w->how->fill_value;
       else if (w->packing->system_of[f] < 0)
-        value[f] = receive(w, f, c, value[f]);
+        value[f] = receive(w, f, c, &row, value[f]);
     }
     if (rows->cover[c] == REMAP_UNCOVERED) continue;
-    for (int s = 0; s < w->packing->num_systems; s++) receive_system(w, s, c, value);
+    for (int s = 0; s < w->packing->num_systems; s++) receive_system(w, s, c, &row, value);
     if (w->packing->num_systems == 0) continue;
     if (rm_is_copied(rows, w->setup->receiving_differs, c, true))
       integrate_copies(w, c, value);

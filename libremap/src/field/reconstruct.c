@@ -48,18 +48,21 @@ static bool keeps_within(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid 
 
 void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double bounds[2])
 {
-  const double value = rm_value_at(u, stencil->num_cells, cell);
+  const double    value = rm_value_at(u, stencil->num_cells, cell);
+  const rm_around near  = *u; /* this and the sums are copies: no write in the loop can change them */
+  double          g[3] = {0.0, 0.0, 0.0}, least = value, greatest = value;
 
-  slope[0] = slope[1] = slope[2] = 0.0;
-  bounds[0] = bounds[1] = value;
-  for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++) {
-    const double other = rm_value_at(u, stencil->num_cells, stencil->neighbour[k]), rise = other - value;
+  for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
+    const double other = rm_value_at(&near, stencil->num_cells, stencil->neighbour[k]), rise = other - value;
 
-    for (int d = 0; d < 3; d++) slope[d] += stencil->weight[k][d] * rise;
-    if (other < bounds[0]) bounds[0] = other; /* not by fmin, which is a call; what is no number changes nothing either way */
-    if (other > bounds[1]) bounds[1] = other;
+    for (int d = 0; d < 3; d++) g[d] += stencil->weight[k][d] * rise;
+    least    = other < least ? other : least; /* not by fmin, which is a call; what is no number changes nothing either way */
+    greatest = other > greatest ? other : greatest;
   }
-  if (!isfinite(slope[0]) || !isfinite(slope[1]) || !isfinite(slope[2])) slope[0] = slope[1] = slope[2] = 0.0;
+  const bool is_good = isfinite(g[0]) && isfinite(g[1]) && isfinite(g[2]);
+  for (int d = 0; d < 3; d++) slope[d] = is_good ? g[d] : 0.0;
+  bounds[0] = least;
+  bounds[1] = greatest;
 }
 
 bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7])
