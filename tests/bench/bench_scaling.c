@@ -25,12 +25,27 @@ static double size_(int n, MPI_Datatype type)
   return (double)n * size;
 }
 
-int MPI_Isend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
+static void message_(double bytes, int to)
 {
   counted_.messages++;
-  counted_.bytes += size_(n, type);
+  counted_.bytes += bytes;
   if (to < MOST_RANKS) counted_.partner[to] = 1;
+}
+
+int MPI_Isend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
+{
+  message_(size_(n, type), to);
   return PMPI_Isend(data, n, type, to, tag, comm, request);
+}
+int MPI_Issend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
+{
+  message_(size_(n, type), to);
+  return PMPI_Issend(data, n, type, to, tag, comm, request);
+}
+int MPI_Ibarrier(MPI_Comm comm, MPI_Request *request)
+{
+  collective_(0);
+  return PMPI_Ibarrier(comm, request);
 }
 int MPI_Allreduce(const void *mine, void *all, int n, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
 {

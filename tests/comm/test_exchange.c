@@ -2,6 +2,25 @@
 #include "comm/comm_private.h"
 #include "rt.h"
 
+/* Messages that this rank sends, as MPI is asked to, and calls in which every rank hears from every other. */
+static int sends_, alltoalls_;
+
+int MPI_Isend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
+{
+  sends_++;
+  return PMPI_Isend(data, n, type, to, tag, comm, request);
+}
+int MPI_Issend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
+{
+  sends_++;
+  return PMPI_Issend(data, n, type, to, tag, comm, request);
+}
+int MPI_Alltoall(const void *mine, int n, MPI_Datatype type, void *all, int m, MPI_Datatype its, MPI_Comm comm)
+{
+  alltoalls_++;
+  return PMPI_Alltoall(mine, n, type, all, m, its, comm);
+}
+
 static rm_comm world(void)
 {
   rm_comm comm;
@@ -64,6 +83,45 @@ static void nothing_at_all_can_be_exchanged(void)
   rm_comm comm = world();
 
   exchange_and_check(&comm, RM_COMM_CHUNK, 0, 0);
+  rm_comm_free(&comm);
+}
+
+/* Everybody sends two items to the rank `distance` above, and ranks below `most` do. */
+static void send_upwards(const rm_comm *comm, int distance, int most)
+{
+  rm_arena     *arena       = rm_arena_new();
+  int64_t      *send_offset = rm_arena_zero(arena, comm->size + 1, sizeof *send_offset);
+  int64_t      *recv_offset = rm_arena_zero(arena, comm->size + 1, sizeof *recv_offset);
+  const int     to = (comm->rank + distance) % comm->size, from = (comm->rank + comm->size - distance % comm->size) % comm->size;
+  const int64_t send[2] = {comm->rank, distance};
+  void         *recv    = NULL;
+
+  for (int r = to; r < comm->size && comm->rank < most; r++) send_offset[r + 1] = 2;
+  RT_EQ(rm_comm_exchange(comm, arena, sizeof *send, send_offset, send, recv_offset, &recv), REMAP_OK);
+  for (int r = 0; r <= comm->size; r++) RT_EQ(recv_offset[r], r > from && from < most ? 2 : 0);
+  if (from < most) RT_EQ(((int64_t *)recv)[0], from);
+  if (from < most) RT_EQ(((int64_t *)recv)[1], distance);
+  rm_arena_drop(arena);
+}
+
+static void exchanges_that_follow_each_other_at_once_stay_apart(void)
+{
+  rm_comm comm = world();
+
+  for (int i = 0; i < 300; i++) send_upwards(&comm, i * i % 7, i % 3 ? comm.size : i % (comm.size + 1));
+  rm_comm_free(&comm);
+}
+
+static void only_those_who_have_something_to_say_send_anything(void)
+{
+  rm_comm comm = world();
+
+  sends_ = alltoalls_ = 0;
+  send_upwards(&comm, 1, comm.size - 1);
+  RT_EQ(sends_, comm.rank < comm.size - 1 ? 2 : 0); /* how much, and that */
+  send_upwards(&comm, comm.size, comm.size); /* to themselves */
+  RT_EQ(sends_, comm.rank < comm.size - 1 ? 2 : 0);
+  RT_EQ(alltoalls_, 0);
   rm_comm_free(&comm);
 }
 
@@ -278,7 +336,8 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
 }
 
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
-        RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
+        RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(exchanges_that_follow_each_other_at_once_stay_apart),
+        RT_CASE(only_those_who_have_something_to_say_send_anything), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
         RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
         RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders),
         RT_CASE(who_says_something_else_is_apart_from_its_peers), RT_CASE(only_neighbours_take_part_in_a_plan),

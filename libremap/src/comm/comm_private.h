@@ -14,6 +14,10 @@ static inline remap_status rm_comm_status(int mpi)
   return mpi == MPI_SUCCESS ? REMAP_OK : REMAP_MPI_FAILURE;
 }
 
+/* The numbers of items that every rank is about to send to this one: count[comm->size], out of everybody's send_offset
+ * [comm->size + 1]. Collective; before it is called again the ranks have to meet, in any collective call. */
+remap_status rm_comm_counts(const rm_comm *comm, const int64_t *send_offset, int64_t *count);
+
 /* As rm_comm_allgather, rm_comm_allgatherv, rm_comm_exchange, rm_plan_run and rm_flow_init, with messages of at most chunk
  * bytes, 1 <= chunk <= RM_COMM_CHUNK, the same on every rank. */
 remap_status rm_comm_allgather_chunked(const rm_comm *comm, int64_t chunk, const void *mine, void *all, int64_t n, size_t size);

@@ -71,14 +71,11 @@ remap_status rm_comm_exchange_chunked(const rm_comm *comm, int64_t chunk, rm_are
   int64_t       total, own;
   char         *data;
 
-  for (int r = 0; r < comm->size; r++) {
-    RM_ASSERT(send_offset[r] <= send_offset[r + 1]);
-    recv_offset[r] = send_offset[r + 1] - send_offset[r];
-  }
-  RM_TRY(rm_comm_status(MPI_Alltoall(MPI_IN_PLACE, 1, MPI_INT64_T, recv_offset, 1, MPI_INT64_T, comm->mpi)));
+  for (int r = 0; r < comm->size; r++) RM_ASSERT(send_offset[r] <= send_offset[r + 1]);
+  RM_TRY(rm_comm_counts(comm, send_offset, recv_offset));
   total = rm_offsets(recv_offset, comm->size);
   data  = rm_arena_alloc(arena, total, size);
-  RM_TRY(rm_comm_agree(comm, data ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_TRY(rm_comm_agree(comm, data ? REMAP_OK : REMAP_NO_MEMORY, NULL)); /* keeps the counts of two exchanges apart, too */
   *recv = data;
 
   own = send_offset[me + 1] - send_offset[me];
