@@ -372,6 +372,39 @@ static void the_cut_does_not_depend_on_who_hands_in_what(void)
   }
 }
 
+/* Cells of the zone of both meshes, on all ranks, whose keys lie below. */
+static int64_t cells_below(world *w, const rm_frame *zone_frame, uint64_t key)
+{
+  int64_t num = 0;
+
+  for (int side = 0; side < 2; side++)
+    for (rm_lid k = 0; k < w->zone->num_cells[side]; k++)
+      num += rm_part_key(zone_frame, w->in.mesh[side]->cell_box[w->zone->cell[side][k]]) < key;
+  RT_EQ(rm_comm_sum_i64(&w->in.comm, &num, 1), REMAP_OK);
+  return num;
+}
+
+static void check_even_cuts(world *w)
+{
+  const rm_comm *comm = &w->in.comm;
+  rm_cuts        cuts = {0};
+  rm_frame       zone_frame;
+
+  RT_EQ(rm_part_frame(comm, &w->in.frame, w->in.mesh, w->zone, &zone_frame), REMAP_OK);
+  RT_EQ(rm_part_cut_evenly(w->in.arena, comm, &zone_frame, w->in.mesh, w->zone, &cuts), REMAP_OK);
+  RT_EQ(cuts.num, comm->size - 1);
+  const int64_t total = cells_below(w, &zone_frame, UINT64_MAX), slack = total / comm->size / 64;
+  for (int i = 0; i < cuts.num; i++) {
+    const int64_t goal = total * (i + 1) / comm->size, below = cells_below(w, &zone_frame, cuts.key[i]);
+
+    RT_CHECK(i == 0 || cuts.key[i - 1] <= cuts.key[i]);
+    RT_CHECK(below <= goal + slack);
+    if (below < goal - slack) RT_CHECK(cells_below(w, &zone_frame, cuts.key[i] + 1) > goal); /* cells of one key stay together */
+  }
+}
+
+static void cells_are_cut_into_even_numbers(void) { for_all_worlds(check_even_cuts); }
+
 static void meshes_apart_leave_every_rank_with_empty_pieces(void)
 {
   world w;
@@ -503,7 +536,7 @@ RT_MAIN(RT_CASE(every_invariant_holds), RT_CASE(every_target_of_the_zone_and_no_
         RT_CASE(skin_stays_skin_and_cut_faces_do_not_become_it), RT_CASE(the_small_targets_of_a_rank_are_an_interval_of_keys),
         RT_CASE(equal_grids_are_shared_out_evenly), RT_CASE(the_partners_of_a_giant_stay_apart),
         RT_CASE(pairs_are_shared_out_evenly_though_one_grid_is_refined_in_a_corner),
-        RT_CASE(the_cut_does_not_depend_on_who_hands_in_what),
+        RT_CASE(the_cut_does_not_depend_on_who_hands_in_what), RT_CASE(cells_are_cut_into_even_numbers),
         RT_CASE(meshes_apart_leave_every_rank_with_empty_pieces),
         RT_CASE(the_check_sees_a_face_that_is_turned_missing_or_beside_no_cell),
         RT_CASE(all_ranks_fail_alike_when_one_is_out_of_memory_for_the_product),

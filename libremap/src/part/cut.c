@@ -1,25 +1,31 @@
 /* cut -- intervals of Morton keys, one per rank: first of even numbers of cells, then of even estimated work.
  *
- * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are exact quantiles, depend on the zone's cells and
- * not on who hands them in, and cells of equal key stay together. O(n) time to sort n keys here; then ROUNDS sums over all
- * ranks of WAYS - 1 numbers per cut, for which a rank walks along its keys once. Tags that lie in order over the ranks are cut
- * by adding up: O(n) and two small collectives. */
+ * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are quantiles to within a 64th of a rank's share,
+ * depend on the zone's cells and not on who hands them in, and cells of equal key stay together. O(n) time to sort n keys here;
+ * then at most ROUNDS sums over all ranks of WAYS - 1 numbers for each range in which a cut is still looked for, for which a
+ * rank walks along its keys once. Few ranges are left apart at first, few cuts are not found at last: on P ranks about three
+ * sums of P ranges. Tags that lie in order over the ranks are cut by adding up: O(n) and two small collectives. */
 #include "part/part_private.h"
 
 #include <float.h>
 
-/* Every round divides the range that holds a cut by WAYS. */
-enum { WAY_BITS = 3, WAYS = 1 << WAY_BITS, ROUNDS = RM_KEY_BITS / WAY_BITS };
+/* Every round divides the range that holds a cut by WAYS. A cut is good enough if a SLACK-th of a rank's share is on the wrong
+ * side. */
+enum { WAY_BITS = 3, WAYS = 1 << WAY_BITS, ROUNDS = RM_KEY_BITS / WAY_BITS, SLACK = 64 };
 
-/* The search for all cuts at once. Cut s lies in [low[s], low[s] + width). */
+/* The search for all cuts at once. A cut that is open lies in [low, low + width); ranges of two are the same or apart. */
 typedef struct search {
   int64_t         num_keys;
-  const rm_keyed *keyed;    /* [num_keys] this rank's keys, ascending                */
-  int             num_cuts; /* comm->size - 1                                        */
+  const rm_keyed *keyed;    /* [num_keys] this rank's keys, ascending           */
+  int             num_cuts; /* comm->size - 1                                   */
   uint64_t        width;
-  uint64_t       *low;      /* [num_cuts]                                            */
-  int64_t        *goal;     /* [num_cuts] cells that shall lie below the cut         */
-  int64_t        *below;    /* [num_cuts][WAYS - 1] cells below the inner probes, all ranks */
+  uint64_t       *low;      /* [num_cuts] of the range, or the cut if it is found */
+  int64_t        *goal;     /* [num_cuts] cells that shall lie below the cut    */
+  int64_t         slack;    /* cells by which that may be missed                */
+  int             num_open;
+  int            *open;     /* [num_open] cuts that are not found yet, ascending */
+  int64_t        *below;    /* [num_cuts][WAYS - 1] for each range with open cuts, ascending: cells of all ranks below its
+                               inner probes */
 } search;
 
 remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], const rm_zone *zone,
@@ -120,6 +126,7 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   RM_NEW(spare, arena, s->num_keys);
   RM_NEW(s->low, arena, s->num_cuts);
   RM_NEW(s->goal, arena, s->num_cuts);
+  RM_NEW(s->open, arena, s->num_cuts);
   RM_NEW(s->below, arena, (int64_t)s->num_cuts * (WAYS - 1));
   for (int side = 0; side < 2; side++)
     for (rm_lid k = 0; k < zone->num_cells[side]; k++) {
@@ -132,27 +139,59 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   return REMAP_OK;
 }
 
-/* One round: WAYS - 1 probes divide each cut's range evenly; it shrinks to the part before the first probe above the goal.
- * Ranges of two cuts are the same or apart, so that the probes ascend. */
-static remap_status narrow(const rm_comm *comm, search *s)
+/* The ranges with open cuts, each divided by WAYS - 1 probes: how many cells of this rank lie below these. Returns the number of
+ * ranges. */
+static int probe(search *s)
 {
-  int64_t at = 0;
+  int64_t at  = 0;
+  int     num = 0;
+
+  for (int k = 0; k < s->num_open; k++) {
+    const uint64_t low = s->low[s->open[k]];
+
+    if (k > 0 && low == s->low[s->open[k - 1]]) continue;
+    for (int j = 0; j < WAYS - 1; j++)
+      s->below[num * (WAYS - 1) + j] = at = num_below(s, at, low + (uint64_t)(j + 1) * s->width);
+    num++;
+  }
+  return num;
+}
+
+/* Move a cut to the part of its range that ends at the first probe above its goal; found: to that end of the part which is
+ * nearer to the goal, if that is near enough. A greater goal never leads to a lower key. */
+static bool narrow(search *s, int cut, const int64_t below[WAYS - 1])
+{
+  int     part = 0;
+  int64_t under, over;
+
+  while (part < WAYS - 1 && below[part] <= s->goal[cut]) part++;
+  s->low[cut] += (uint64_t)part * s->width;
+  under = part > 0 ? s->goal[cut] - below[part - 1] : INT64_MAX;
+  over  = part < WAYS - 1 ? below[part] - s->goal[cut] : INT64_MAX;
+  if (over < under && over <= s->slack) {
+    s->low[cut] += s->width;
+    return true;
+  }
+  return under <= s->slack;
+}
+
+/* One round. */
+static remap_status narrow_all(const rm_comm *comm, search *s)
+{
+  int      num = 0, range = -1;
+  uint64_t last = 0;
 
   s->width /= WAYS;
-  for (int i = 0; i < s->num_cuts; i++)
-    for (int j = 0; j < WAYS - 1; j++) {
-      int64_t *below = s->below + (int64_t)i * (WAYS - 1) + j;
+  RM_TRY(rm_comm_sum_i64(comm, s->below, probe(s) * (WAYS - 1)));
+  for (int k = 0; k < s->num_open; k++) {
+    const int      cut = s->open[k];
+    const uint64_t low = s->low[cut];
 
-      if (i > 0 && s->low[i] == s->low[i - 1]) *below = below[1 - WAYS];
-      else *below = at = num_below(s, at, s->low[i] + (uint64_t)(j + 1) * s->width);
-    }
-  RM_TRY(rm_comm_sum_i64(comm, s->below, s->num_cuts * (WAYS - 1)));
-  for (int i = 0; i < s->num_cuts; i++) {
-    int part = 0;
-
-    while (part < WAYS - 1 && s->below[(int64_t)i * (WAYS - 1) + part] <= s->goal[i]) part++;
-    s->low[i] += (uint64_t)part * s->width;
+    if (range < 0 || low != last) range++;
+    last = low;
+    if (!narrow(s, cut, s->below + (int64_t)range * (WAYS - 1))) s->open[num++] = cut;
   }
+  s->num_open = num;
   return REMAP_OK;
 }
 
@@ -175,10 +214,13 @@ remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_f
   for (int i = 0; i < s.num_cuts; i++) {
     s.low[i]  = 0;
     s.goal[i] = goal_of(total, comm->size, i);
+    s.open[i] = i;
   }
-  s.width = UINT64_C(1) << RM_KEY_BITS;
-  for (int round = 0; round < ROUNDS; round++) RM_TRY(narrow(comm, &s));
-  RM_ASSERT(s.width == 1);
+  s.num_open = s.num_cuts;
+  s.slack    = total / comm->size / SLACK;
+  s.width    = UINT64_C(1) << RM_KEY_BITS;
+  for (int round = 0; round < ROUNDS && s.num_open > 0; round++) RM_TRY(narrow_all(comm, &s));
+  for (int i = 1; i < s.num_cuts; i++) RM_ASSERT(s.low[i - 1] <= s.low[i]);
   *out = (rm_cuts){s.num_cuts, s.low};
   return REMAP_OK;
 }

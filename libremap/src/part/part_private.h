@@ -115,8 +115,8 @@ int rm_part_seat(const rm_cuts *cuts, uint64_t key);
 remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *mesh,
                                     const rm_zone *zone, const rm_cuts *cuts, rm_route *out);
 
-/* Cut the zone's cells of both meshes, as this rank handed them in, into intervals of equal numbers, as exactly as keys differ.
- * Collective. *out lives in arena, as does what is needed on the way. */
+/* Cut the zone's cells of both meshes, as this rank handed them in, into intervals of equal numbers to within a 32nd, or as far
+ * as keys differ. Collective. *out lives in arena, as does what is needed on the way. */
 remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                                 const rm_zone *zone, rm_cuts *out);
 
