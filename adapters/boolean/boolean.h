@@ -74,11 +74,8 @@ typedef struct bool_operand {
   rsurf_repairs      repairs;   /**< the same on every rank */
   remap_mesh         mesh;      /**< this rank's part */
   int64_t            num_cells; /**< of all ranks */
-  int                num_boundaries;
-  const char *const *boundary_name; /**< [num_boundaries] the same on every rank */
-  const char *const *boundary_type; /**< [num_boundaries] NULL for a surface */
-  const int32_t     *face_boundary; /**< [faces of this rank] -1: none */
-  char             **own_name;      /**< behind boundary_name, of a surface */
+  rcgns_boundaries   boundaries; /**< types NULL for a surface */
+  char             **own_name;   /**< behind their names, of a surface */
 } bool_operand;
 
 /** Open operand number side (0: A, 1: B): by its ending a surface, else CGNS. Collective. Errors: USAGE, IO, GEOMETRY,
@@ -93,8 +90,7 @@ typedef struct bool_content {
   rslice_content content;
   rslice_field  *field;  /**< content.field */
   double        *values; /**< behind them */
-  const char   **boundary_name, **boundary_type;
-  int32_t       *face_boundary;
+  cli_boundaries boundaries;
 } bool_content;
 
 /** Take over what the cells and faces of the operands have. A field that both have is A's in the cells of A, else B's; a cell

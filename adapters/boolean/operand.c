@@ -63,12 +63,12 @@ static cli_exit open_surface(MPI_Comm comm, const char *path, double scale, bool
   }
   MPI_Bcast(count, 2, MPI_INT64_T, 0, comm);
   MPI_Bcast(&o->repairs, (int)sizeof o->repairs, MPI_BYTE, 0, comm);
-  o->num_cells      = count[0];
-  o->num_boundaries = (int)count[1];
-  o->mesh           = rsurf_mesh(&o->surface, path);
-  o->face_boundary  = o->surface.face_group;
-  CLI_TRY(share_names(comm, o->num_boundaries, o->surface.group_name, &o->own_name, why));
-  o->boundary_name = (const char *const *)o->own_name;
+  o->num_cells       = count[0];
+  o->mesh            = rsurf_mesh(&o->surface, path);
+  o->boundaries.num  = (int)count[1];
+  o->boundaries.face = o->surface.face_group;
+  CLI_TRY(share_names(comm, o->boundaries.num, o->surface.group_name, &o->own_name, why));
+  o->boundaries.name = (const char *const *)o->own_name;
   return CLI_DONE;
 }
 
@@ -78,7 +78,6 @@ static cli_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, 
 {
   rcgns_options    how;
   rcgns_choice     choice;
-  rcgns_boundaries boundaries;
   rcgns_message    message;
 
   rcgns_options_default(&how);
@@ -87,11 +86,7 @@ static cli_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, 
   CLI_TRY(cli_from_cgns(rcgns_open(comm, o->path, &how, &o->file, &message), &message, why));
   o->mesh      = *rcgns_mesh(o->file);
   o->num_cells = rcgns_get_info(o->file)->num_cells;
-  CLI_TRY(cli_from_cgns(rcgns_read_boundaries(o->file, &boundaries, &message), &message, why));
-  o->num_boundaries = boundaries.num;
-  o->boundary_name  = boundaries.name;
-  o->boundary_type  = boundaries.type;
-  o->face_boundary  = boundaries.face;
+  CLI_TRY(cli_from_cgns(rcgns_read_boundaries(o->file, &o->boundaries, &message), &message, why));
   rcgns_choice_default(&choice);
   choice.name     = options->solution;
   choice.optional = 1;
@@ -107,50 +102,10 @@ cli_exit bool_operand_open(MPI_Comm comm, const bool_options *options, int side,
 
 void bool_operand_close(bool_operand *operand)
 {
-  for (int i = 0; i < operand->num_boundaries && operand->own_name; i++) free(operand->own_name[i]);
+  for (int i = 0; i < operand->boundaries.num && operand->own_name; i++) free(operand->own_name[i]);
   free(operand->own_name);
   rsurf_drop(&operand->surface);
   rcgns_close(&operand->file);
-}
-
-/* ---- boundaries ---------------------------------------------------------------------------------------------------- */
-
-/* The number of a boundary in the list of the result, which grows by it if it is new. */
-static int32_t number_of(bool_content *c, const char *name, const char *type)
-{
-  int i = 0;
-
-  while (i < c->content.num_boundaries && (strcmp(c->boundary_name[i], name) || strcmp(c->boundary_type[i], type))) i++;
-  c->boundary_name[i] = name;
-  c->boundary_type[i] = type;
-  if (i == c->content.num_boundaries) c->content.num_boundaries++;
-  return i;
-}
-
-/* Boundary of the faces of the result that lie in faces of one operand; those that have one already keep it. Collective. */
-static cli_exit take_boundaries(MPI_Comm comm, remap_context *ctx, int side, const bool_operand *o, int64_t num_faces,
-                                bool_content *c, cli_failure *why)
-{
-  int32_t *mine     = malloc(((size_t)o->mesh.num_faces + 1) * sizeof *mine);
-  int32_t *taken    = malloc(((size_t)num_faces + 1) * sizeof *taken),
-          *number   = calloc((size_t)o->num_boundaries + 1, sizeof *number);
-  cli_exit     code = cli_agree_on(comm, mine && taken && number ? CLI_DONE : cli_no_memory(why), why);
-  remap_status status;
-
-  for (int b = 0; code == CLI_DONE && b < o->num_boundaries; b++)
-    number[b] = number_of(c, o->boundary_name[b], o->boundary_type ? o->boundary_type[b] : "UserDefined");
-  for (int64_t f = 0; code == CLI_DONE && f < o->mesh.num_faces; f++)
-    mine[f] = o->face_boundary && o->face_boundary[f] >= 0 ? number[o->face_boundary[f]] : -1;
-  if (code == CLI_DONE) {
-    status = remap_supermesh_face_values(ctx, (remap_side)side, mine, -1, taken);
-    if (status != REMAP_OK) code = cli_fail(why, CLI_INTERNAL, "%s: %s", o->path, remap_status_text(status));
-  }
-  for (int64_t f = 0; code == CLI_DONE && f < num_faces; f++)
-    if (c->face_boundary[f] < 0) c->face_boundary[f] = taken[f];
-  free(mine);
-  free(taken);
-  free(number);
-  return code;
 }
 
 /* ---- fields -------------------------------------------------------------------------------------------------------- */
@@ -264,21 +219,17 @@ static cli_exit check_solution(const bool_options *options, const bool_operand o
 cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
                            const remap_supermesh_view *view, bool_content *out, cli_failure *why)
 {
-  const size_t most = (size_t)(operand[0].num_boundaries + operand[1].num_boundaries) + 1;
-  cli_exit     code;
+  cli_boundaries *b = &out->boundaries;
 
   CLI_TRY(check_solution(options, operand, why));
-  *out = (bool_content){.content       = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}},
-                        .boundary_name = calloc(most, sizeof *out->boundary_name),
-                        .boundary_type = calloc(most, sizeof *out->boundary_type),
-                        .face_boundary = malloc(((size_t)view->num_faces + 1) * sizeof *out->face_boundary)};
-  code = out->boundary_name && out->boundary_type && out->face_boundary ? CLI_DONE : cli_no_memory(why);
-  CLI_TRY(cli_agree_on(comm, code, why));
-  out->content.boundary_name = out->boundary_name;
-  out->content.boundary_type = out->boundary_type;
-  out->content.face_boundary = out->face_boundary;
-  for (int64_t f = 0; f < view->num_faces; f++) out->face_boundary[f] = -1;
-  for (int side = 0; side < 2; side++) CLI_TRY(take_boundaries(comm, ctx, side, &operand[side], view->num_faces, out, why));
+  *out = (bool_content){.content = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}}};
+  CLI_TRY(cli_boundaries_begin(comm, view->num_faces, operand[0].boundaries.num + operand[1].boundaries.num, b, why));
+  for (int side = 0; side < 2; side++)
+    CLI_TRY(cli_boundaries_take(comm, ctx, (remap_side)side, &operand[side].mesh, &operand[side].boundaries, b, why));
+  out->content.num_boundaries = b->num;
+  out->content.boundary_name  = b->name;
+  out->content.boundary_type  = b->type;
+  out->content.face_boundary  = b->face;
   return take_fields(comm, options, ctx, operand, view, out, why);
 }
 
@@ -286,8 +237,6 @@ void bool_content_drop(bool_content *content)
 {
   free(content->field);
   free(content->values);
-  free(content->boundary_name);
-  free(content->boundary_type);
-  free(content->face_boundary);
+  cli_boundaries_drop(&content->boundaries);
   *content = (bool_content){.field = NULL};
 }

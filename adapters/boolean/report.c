@@ -77,12 +77,12 @@ static void print_operand(FILE *out, char letter, const bool_operand *o)
     const rcgns_info *info = rcgns_get_info(o->file);
 
     fprintf(out, "%lld zones, %lld cells, %d boundaries\n", (long long)info->num_zones, (long long)info->num_cells,
-            o->num_boundaries);
+            o->boundaries.num);
     for (int64_t i = 0; i < info->num_notes; i++) fprintf(out, "   note: %s\n", info->note[i]);
     return;
   }
   fprintf(out, "a surface of %lld shells, %lld of them voids; %d groups\n", (long long)o->repairs.shells,
-          (long long)o->repairs.voids, o->num_boundaries);
+          (long long)o->repairs.voids, o->boundaries.num);
   if (o->repairs.faces_dropped || o->repairs.faces_turned || o->repairs.faces_cut || o->repairs.faces_flipped)
     fprintf(out,
             "   repaired: %lld faces turned round, %lld without size dropped, %lld without area flipped, %lld bent or concave "
@@ -98,8 +98,8 @@ void bool_report_print(FILE *out, const bool_report *r)
   fprintf(out, "\n%-10s %12s %20s\n", "result", "cells", "volume");
   for (int k = 0; k < 3; k++) fprintf(out, "%-10s %12lld %20.12g\n", kind_word[k], (long long)r->cells[k], r->volume[k]);
   fprintf(out, "%lld faces, %lld nodes\n", (long long)r->view.global_faces, (long long)r->view.global_nodes);
-  for (int b = 0; r->options->verbose && r->content && b < r->content->content.num_boundaries; b++)
-    fprintf(out, "boundary   %s (%s)\n", r->content->boundary_name[b], r->content->boundary_type[b]);
+  for (int b = 0; r->options->verbose && r->content && b < r->content->boundaries.num; b++)
+    fprintf(out, "boundary   %s (%s)\n", r->content->boundaries.name[b], r->content->boundaries.type[b]);
   for (int k = 0; r->content && k < r->content->content.num_fields; k++)
     fprintf(out, "field      %s\n", r->content->field[k].name);
   fprintf(out, "\ntime    read %.2f s, supermesh %.2f s, write %.2f s, total %.2f s\n", r->seconds_read, r->seconds_supermesh,
@@ -126,7 +126,7 @@ static json_t *words(const char *text)
 static json_t *operand_json(const bool_operand *o)
 {
   json_t *json = json_pack("{s:o, s:s, s:I, s:i}", "file", words(o->path), "kind", o->is_surface ? "surface" : "mesh", "cells",
-                           (json_int_t)o->num_cells, "boundaries", o->num_boundaries);
+                           (json_int_t)o->num_cells, "boundaries", o->boundaries.num);
 
   if (json && o->is_surface)
     json_object_set_new(json, "repairs",
@@ -146,8 +146,8 @@ static json_t *result_json(const bool_report *r)
 
   for (int k = 0; k < 3; k++)
     json_object_set_new(json, kind_word[k], json_pack("{s:I, s:f}", "cells", (json_int_t)r->cells[k], "volume", r->volume[k]));
-  for (int b = 0; r->content && b < r->content->content.num_boundaries; b++)
-    json_array_append_new(names, words(r->content->boundary_name[b]));
+  for (int b = 0; r->content && b < r->content->boundaries.num; b++)
+    json_array_append_new(names, words(r->content->boundaries.name[b]));
   json_object_set_new(json, "boundaries", names);
   names = json_array();
   for (int k = 0; r->content && k < r->content->content.num_fields; k++)

@@ -239,7 +239,8 @@ rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solutio
 void rcgns_close(rcgns_file **file);
 
 /** Write a supermesh to a new HDF5 file at `path`, stamped `version` (see rcgns_create): one zone "Base/Zone" of NGON_n and
- *  NFACE_n; a BC_t with a PointList of faces for each boundary that has outer faces, its name cut to what CGNS takes; the
+ *  NFACE_n; "FaceAncestors/LiesIn" below NGON_n, the origins of rslice_faces; a BC_t with a PointList of faces for each
+ *  boundary that has outer faces, its name cut to what CGNS takes; the
  *  ancestors (integers, counted from 1, 0: none), "Volume" and the fields in the CellCenter FlowSolution_t
  *  "FlowSolution#Centers". The file appears when it is complete; an existing one is replaced. The bytes do not depend on the
  *  number of ranks. Collective on comm.

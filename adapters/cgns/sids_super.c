@@ -1,5 +1,6 @@
 /* sids_super -- a supermesh as a file: one zone of polyhedra with NGON_n and NFACE_n, boundary conditions on its outer faces,
- * and its ancestors and fields as cell-centred values. Each rank writes its slices; linear in them. */
+ * its ancestors and fields as cell-centred values, and which mesh each face comes from. Each rank writes its slices; linear in
+ * them. */
 #include "cgns_private.h"
 
 #include <stdio.h>
@@ -18,7 +19,7 @@ typedef struct sheet {
   char (*bc_name)[RC_NAME];                 /* [boundaries] fit for nodes, distinct */
 } sheet;
 
-enum { FACE_HEAD = 3, FACE_NODE = 0, CELL_FACE = 1 }; /* words of a row of faces before the nodes; what is counted */
+enum { FACE_NODE = 0, CELL_FACE = 1 }; /* what is counted */
 
 /* ---- counts -------------------------------------------------------------------------------------------------------- */
 
@@ -42,7 +43,7 @@ static void count_all(sheet *s)
 {
   const int64_t num = s->content->num_boundaries;
 
-  s->before[FACE_NODE] = s->faces.offset[s->faces.num] - FACE_HEAD * s->faces.num;
+  s->before[FACE_NODE] = s->faces.offset[s->faces.num] - RSLICE_FACE_HEAD * s->faces.num;
   s->before[CELL_FACE] = s->cells.offset[s->cells.num] - rslice_cell_head(s->content) * s->cells.num;
   for (int64_t f = 0; f < s->faces.num; f++)
     if (num && boundary_of(s, f) >= 0) s->bc_before[boundary_of(s, f)]++;
@@ -170,13 +171,28 @@ static void put_parents(sheet *s, int64_t parent)
             f->first + f->num, cell);
 }
 
+/* What mesh each face comes from. */
+static void put_origins(sheet *s, int64_t parent)
+{
+  const rslice_rows *f      = &s->faces;
+  int64_t           *origin = rc_draft_own(&s->draft, f->num, sizeof *origin);
+  const int64_t at = rc_draft_put(&s->draft, parent, "FaceAncestors", "UserDefinedData_t", NULL, 0, NULL, 0, NULL);
+
+  for (int64_t i = 0; origin && i < f->num; i++) origin[i] = f->word[f->offset[i] + 3];
+  put_slice(s, at, "LiesIn", "DataArray_t", "I4", 1, &s->content->mesh->global_faces, f->first, f->first + f->num, origin);
+  rc_draft_text(&s->draft, at, "Meaning", "Descriptor_t",
+                "1: in a face of the mesh of the first ancestor, 2: of the second, 3: of both. It is the face between the ancestors "
+                "of the cells beside it.");
+}
+
 static void put_elements(sheet *s)
 {
   const remap_supermesh_view *m  = s->content->mesh;
   int64_t                     at = put_section(s, "NGonElements", 22, 1, m->global_faces);
 
-  put_rows(s, at, &s->faces, FACE_HEAD, 1, FACE_NODE, m->global_faces, m->global_nodes);
+  put_rows(s, at, &s->faces, RSLICE_FACE_HEAD, 1, FACE_NODE, m->global_faces, m->global_nodes);
   put_parents(s, at);
+  put_origins(s, at);
   at = put_section(s, "NFaceElements", 23, m->global_faces + 1, m->global_cells);
   put_rows(s, at, &s->cells, rslice_cell_head(s->content), 0, CELL_FACE, m->global_cells, m->global_faces);
 }

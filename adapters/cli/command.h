@@ -1,5 +1,5 @@
 /* command.h -- what the commands remap and remap-boolean share: a table of options that makes the parser and the help,
- * agreement of ranks, failures of the CGNS adapter in their words. */
+ * agreement of ranks, failures of the CGNS adapter in their words, boundaries of a supermesh. */
 #ifndef REMAP_CLI_COMMAND_H
 #define REMAP_CLI_COMMAND_H
 
@@ -7,6 +7,7 @@
 
 #include <cgns.h>
 #include <mpi.h>
+#include <remap/remap.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -50,6 +51,25 @@ cli_exit cli_no_memory(cli_failure *why);
 
 /** A status of the CGNS adapter as an exit status; its message becomes ours. Not collective. */
 cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_failure *why);
+
+/** The boundaries of a supermesh. Owned: cli_boundaries_drop. */
+typedef struct cli_boundaries {
+  int          num;
+  const char **name, **type; /**< [num] texts are borrowed; the same on every rank */
+  int64_t      num_faces;
+  int32_t     *face; /**< [num_faces] of this rank; -1: none */
+} cli_boundaries;
+
+/** Begin without any, with room for the boundaries of both operands, `most` in all. Collective. Errors: INTERNAL. */
+cli_exit cli_boundaries_begin(MPI_Comm comm, int64_t num_faces, int most, cli_boundaries *out, cli_failure *why);
+
+/** Take those of one operand, whose part on this rank is mesh, over to the faces of the supermesh of ctx that lie in its faces;
+ *  faces that have one keep it. Those of one name and type are one. Collective. Errors: INTERNAL. */
+cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side, const remap_mesh *mesh,
+                             const rcgns_boundaries *from, cli_boundaries *to, cli_failure *why);
+
+/** Give them back; harmless on none. Not collective. */
+void cli_boundaries_drop(cli_boundaries *boundaries);
 
 /** Seconds since then, of the slowest rank. Collective. */
 double cli_slowest(MPI_Comm comm, double since);

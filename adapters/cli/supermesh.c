@@ -20,11 +20,27 @@ static cli_exit write_file(cli_job *j, const rslice_content *content, cli_failur
   return status == RVTK_OK ? CLI_DONE : cli_fail(why, status == RVTK_IO ? CLI_IO : CLI_INTERNAL, "%s", text.text);
 }
 
+/* The boundaries of both files; where a face lies on one of each, that of SOURCE. Collective. */
+static cli_exit take_boundaries(cli_job *j, cli_boundaries *to, int64_t num_faces, cli_failure *why)
+{
+  rcgns_boundaries from[2];
+  rcgns_message    message;
+
+  for (int side = 0; side < 2; side++)
+    CLI_TRY(cli_from_cgns(rcgns_read_boundaries(j->file[side], &from[side], &message), &message, why));
+  CLI_TRY(cli_boundaries_begin(j->comm, num_faces, from[0].num + from[1].num, to, why));
+  for (int side = 0; side < 2; side++)
+    CLI_TRY(cli_boundaries_take(j->comm, j->ctx, (remap_side)side, rcgns_mesh(j->file[side]), &from[side], to, why));
+  return CLI_DONE;
+}
+
 cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
 {
   remap_supermesh_view view;
-  const rslice_content content = {.mesh = &view, .ancestor = {"AncestorSource", "AncestorTarget"}};
+  cli_boundaries       b       = {.num = 0};
+  rslice_content       content = {.mesh = &view, .ancestor = {"AncestorSource", "AncestorTarget"}};
   cli_supermesh_row   *row     = &j->report.supermesh;
+  cli_exit             code;
 
   cli_progress_set(j->progress, "supermesh", -1);
   CLI_TRY(cli_from_remap(j, remap_supermesh(j->ctx, NULL, &view), why));
@@ -32,7 +48,13 @@ cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
   row->volume = 0;
   for (int64_t c = 0; c < view.num_cells; c++) row->volume += view.cell_volume[c];
   MPI_Allreduce(MPI_IN_PLACE, &row->volume, 1, MPI_DOUBLE, MPI_SUM, j->comm);
-  CLI_TRY(write_file(j, &content, why));
-  row->path = j->options.supermesh;
-  return CLI_DONE;
+  code                   = take_boundaries(j, &b, view.num_faces, why);
+  content.num_boundaries = b.num;
+  content.boundary_name  = b.name;
+  content.boundary_type  = b.type;
+  content.face_boundary  = b.face;
+  if (code == CLI_DONE) code = write_file(j, &content, why);
+  cli_boundaries_drop(&b);
+  if (code == CLI_DONE) row->path = j->options.supermesh;
+  return code;
 }

@@ -84,7 +84,7 @@ rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_
   rows                        r      = {.num = 0};
   rslice_status               status = RSLICE_OK;
 
-  if (!behind || !rows_begin(&r, m->num_faces, 3 * m->num_faces + (m->num_faces ? m->face_offset[m->num_faces] : 0)))
+  if (!behind || !rows_begin(&r, m->num_faces, RSLICE_FACE_HEAD * m->num_faces + (m->num_faces ? m->face_offset[m->num_faces] : 0)))
     status = RSLICE_MEMORY;
   for (int64_t f = 0; status == RSLICE_OK && f < m->num_faces; f++) {
     const int64_t mine = m->cell_global[m->face_owner[f]], other = behind[f];
@@ -94,6 +94,7 @@ rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_
     put(&r, turn ? other : mine);
     put(&r, turn ? mine : other);
     put(&r, content->num_boundaries ? content->face_boundary[f] : -1);
+    put(&r, (m->face_from[0][f] >= 0) + 2 * (m->face_from[1][f] >= 0));
     put_loop(&r, m, f, turn);
     close_row(&r, m->face_global[f]);
   }

@@ -35,6 +35,17 @@ near "$(area corner.obj dice)" 0.75 1e-14
 near "$(area corner.obj unnamed)" 0.75 1e-14
 hold "$wrong" "names come through a CGNS file with the faces that they belong to"
 
+for n in 1 3; do
+  "$mpiexec" "$numproc_flag" "$n" "$transfer" -q corner.cgns mesh.cgns -o out.cgns --supermesh "super$n.cgns" || complain "remap fails"
+done
+cmp -s super1.cgns super3.cgns || complain "other bytes on 3 ranks"
+checked super1.cgns
+makes 0.125 imprint super1.cgns away.obj -o super.obj
+near "$(area super.obj dice)" 0.75 1e-14
+near "$(area super.obj unnamed)" 0.75 1e-14
+grep -q FaceAncestors super1.cgns || complain "faces have no ancestors"
+hold "$wrong" "the supermesh that remap writes keeps them too"
+
 alike cgns "1 2 3 4" union good.cgns half.cgns
 alike vtu "1 4" union good.cgns dice.obj
 alike obj "1 2" difference good.cgns half.cgns

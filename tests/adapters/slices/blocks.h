@@ -4,8 +4,8 @@
  *   rvtk_write(comm, path, &b->content, &message);
  *   bl_free(b);
  *
- * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. A field "Number" holds 1.5 c, six boundaries
- * are the sides. Memory that runs out ends the program. */
+ * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. Every face lies in one of
+ * the source, every third in one of the target. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the program. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
 
@@ -112,8 +112,9 @@ static inline int64_t *bl_faces(bl_blocks *b, const int32_t *local)
   int64_t              *offset = bl_alloc(b, most + 1, sizeof *offset), *global = bl_alloc(b, most, sizeof *global),
           *loop = bl_alloc(b, 4 * most, sizeof *loop), *beyond_cell = bl_alloc(b, most, sizeof *beyond_cell);
   int32_t *owner = bl_alloc(b, most, sizeof *owner), *neighbour = bl_alloc(b, most, sizeof *neighbour),
-          *beyond_face = bl_alloc(b, most, sizeof *beyond_face), *boundary = bl_alloc(b, most, sizeof *boundary);
+          *beyond_face = bl_alloc(b, most, sizeof *beyond_face), *boundary = bl_alloc(b, most, sizeof *boundary), *from[2];
 
+  for (int side = 0; side < 2; side++) v->face_from[side] = from[side] = bl_alloc(b, most, sizeof *from[side]);
   for (int64_t g = 0; g < most; g++) {
     int64_t       at[3], cell[2], node[4];
     const int     axis = bl_face(b, g, at, cell);
@@ -124,6 +125,7 @@ static inline int64_t *bl_faces(bl_blocks *b, const int32_t *local)
     bl_loop(b, axis, at, node);
     for (int i = 0; i < 4; i++) loop[4 * f + i] = node[out ? 3 - i : i];
     global[f]    = g;
+    from[1][f]   = g % 3 ? -1 : 0;
     owner[f]     = local[cell[out]];
     neighbour[f] = cell[1 - out] < 0 ? -1 : local[cell[1 - out]];
     boundary[f]  = cell[1 - out] < 0 ? 2 * axis + !out : -1;
