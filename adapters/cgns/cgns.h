@@ -184,9 +184,9 @@ typedef struct rcgns_boundaries {
   const int32_t     *face; /**< [faces of rcgns_mesh] number of the boundary, -1: none */
 } rcgns_boundaries;
 
-/** Which faces of this rank's mesh are on which BC_t: by PointRange in blocks, elsewhere by lists and ranges of faces,
- *  elements or vertices. Where two name one face, the first has it. A condition that is given in another way is left out and
- *  noted. Collective. Errors: IO (a list cannot be read), MEMORY. */
+/** Which faces of this rank's mesh are on which BC_t: by ranges and lists of faces, elements or vertices; a face is on one of
+ *  vertices if all of its own are listed. Where two name one face, the first has it. A condition that is given in another way
+ *  (a list of a block at FaceCenter, which does not say across which axis) is left out and noted. Collective. Errors: IO (a list cannot be read), MEMORY. */
 rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgns_message *message);
 
 /** Choose the FlowSolution_t. Collective. choice NULL: the default. *out is a view owned by the file, valid until the next
@@ -240,10 +240,9 @@ void rcgns_close(rcgns_file **file);
 
 /** Write a supermesh to a new HDF5 file at `path`, stamped `version` (see rcgns_create): one zone "Base/Zone" of NGON_n and
  *  NFACE_n; "FaceAncestors/LiesIn" below NGON_n, the origins of rslice_faces; a BC_t with a PointList of faces for each
- *  boundary that has outer faces, its name cut to what CGNS takes; the
- *  ancestors (integers, counted from 1, 0: none), "Volume" and the fields in the CellCenter FlowSolution_t
- *  "FlowSolution#Centers". The file appears when it is complete; an existing one is replaced. The bytes do not depend on the
- *  number of ranks. Collective on comm.
+ *  boundary that has outer faces, its name cut to what CGNS takes; the ancestors (integers, counted from 1, 0: none), "Volume"
+ *  and the fields in the CellCenter FlowSolution_t "FlowSolution#Centers". The file appears when it is complete; an existing
+ *  one is replaced. The bytes do not depend on the number of ranks. Collective on comm.
  *  Errors: USAGE (a bad name, no cells), IO, GEOMETRY (the supermesh is inconsistent), MEMORY. */
 rcgns_status rcgns_write_supermesh(MPI_Comm comm, const char *path, double version, const rslice_content *content,
                                    rcgns_message *message);

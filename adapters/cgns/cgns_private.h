@@ -246,7 +246,7 @@ typedef struct rc_zone {
 
 /* A face without neighbour on this rank, by what boundary conditions call it. key: in a block {2 axis + (it is the upper
  * side), i, j, k of its cell}; of standard elements its nodes in the zone, ascending, then -1; of polyhedra {its element
- * number, -1, -1, -1}. */
+ * number, -1, first, last + 1 of its nodes in rim_node}. */
 typedef struct rc_rim {
   int64_t face, zone, key[4]; /* zone: its node in the tree */
 } rc_rim;
@@ -254,6 +254,7 @@ typedef struct rc_rim {
 /* This rank's mesh while it grows. */
 typedef struct rc_mesh {
   rc_array rim;         /* rc_rim */
+  rc_array rim_node;    /* int64_t, of polyhedra: nodes in the zone */
   rc_array xyz;         /* double[3] */
   rc_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
   rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */

@@ -1,8 +1,7 @@
 /* sids_bc -- boundary conditions: which faces of this rank's mesh are on which BC_t.
  *
- * The mesh keeps for each face without neighbour what a file calls it (rc_rim). Conditions of blocks are ranges of indices,
- * known from the tree. Those of other zones are lists of element numbers or vertices, which all ranks read in the same blocks,
- * and each looks up its own faces; where faces are elements of their own (TRI_3 and so on) their sections are read first, to
+ * The mesh keeps for each face without neighbour what a file calls it (rc_rim). Conditions are ranges, known from the tree, or
+ * lists of indices, element numbers or vertices, which all ranks read in the same pieces, and each looks up its own faces; where faces are elements of their own (TRI_3 and so on) their sections are read first, to
  * learn their numbers. O(rim + boundary elements of the file) on every rank, with no list in memory. */
 #include "cgns_private.h"
 
@@ -20,9 +19,10 @@ typedef struct bc_zone {
   int64_t        num;
   rc_map         by_nodes;  /* standard elements: nodes of a rim -> its place in rim_of */
   rc_array       rim_of;    /* int64_t */
-  rc_map         by_number; /* element number -> place in rim_of_number */
+  rc_map         by_number; /* element number, of a block code_of -> place in rim_of_number */
   rc_array       rim_of_number;
-  rc_map         node;  /* nodes of rims */
+  bool           has_nodes;
+  rc_map         node;  /* nodes of rims; once a condition of vertices was met */
   uint8_t       *named; /* [nodes of rims] the condition's list has it */
 } bc_zone;
 
@@ -59,23 +59,77 @@ static bool add_key(rc_map *map, rc_array *rim_of, const int64_t *key, int64_t r
 
 static bool is_poly(const rc_rim *rim) { return rim->key[1] < 0; }
 
+/* Faces of a block across an axis, and its nodes (axis -1), are numbered from 1 by the indices i, j, k from 0 of the corner of
+ * least ones. */
+static int64_t code_of(const rc_zone *zone, int64_t axis, int64_t i, int64_t j, int64_t k)
+{
+  const int64_t *n = zone->vertices;
+
+  return (((axis + 1) * n[2] + k) * n[1] + j) * n[0] + i + 1;
+}
+
 static bool index_rims(bc_zone *z)
 {
   bool ok = true;
 
   z->by_nodes.width  = 4;
   z->by_number.width = z->node.width = 1;
-  for (int64_t i = 0; i < z->num && ok && !z->zone->is_structured; i++) {
+  for (int64_t i = 0; i < z->num && ok; i++) {
     const int64_t *key = z->rim[i].key;
 
-    if (is_poly(&z->rim[i])) {
-      ok = add_key(&z->by_number, &z->rim_of_number, key, i);
-      continue;
+    if (z->zone->is_structured) {
+      int64_t at[3] = {key[1], key[2], key[3]}, code;
+
+      at[key[0] / 2] += key[0] % 2;
+      code = code_of(z->zone, key[0] / 2, at[0], at[1], at[2]);
+      ok   = add_key(&z->by_number, &z->rim_of_number, &code, i);
+    } else {
+      ok = is_poly(&z->rim[i]) ? add_key(&z->by_number, &z->rim_of_number, key, i) : add_key(&z->by_nodes, &z->rim_of, key, i);
     }
-    ok = add_key(&z->by_nodes, &z->rim_of, key, i);
-    for (int k = 0; k < 4 && key[k] >= 0 && ok; k++) ok = rc_map_add(&z->node, &key[k]) >= 0;
   }
-  z->named = calloc((size_t)z->node.key.count + 1, 1);
+  return ok;
+}
+
+/* The nodes of a rim, in the zone from 0; those of a block go to room. */
+static int64_t nodes_of(const bc_zone *z, const rc_rim *rim, int64_t room[4], const int64_t **node)
+{
+  const int64_t axis = rim->key[0] / 2;
+  int64_t       num  = 0;
+
+  *node = z->zone->is_structured ? room : rim->key;
+  if (z->zone->is_structured) {
+    for (; num < 4; num++) {
+      int64_t at[3] = {rim->key[1], rim->key[2], rim->key[3]};
+
+      at[axis] += rim->key[0] % 2;
+      at[(axis + 1) % 3] += num % 2;
+      at[(axis + 2) % 3] += num / 2;
+      room[num] = code_of(z->zone, -1, at[0], at[1], at[2]) - 1;
+    }
+    return num;
+  }
+  if (is_poly(rim)) {
+    *node = (const int64_t *)z->file->build.rim_node.item + rim->key[2];
+    return rim->key[3] - rim->key[2];
+  }
+  while (num < 4 && rim->key[num] >= 0) num++;
+  return num;
+}
+
+/* Collect the nodes of rims, unless that is done. */
+static bool index_nodes(bc_zone *z)
+{
+  const int64_t *node;
+  int64_t        room[4];
+  bool           ok = true;
+
+  for (int64_t i = 0; i < z->num && ok && !z->has_nodes; i++) {
+    const int64_t num = nodes_of(z, &z->rim[i], room, &node);
+
+    for (int64_t k = 0; k < num && ok; k++) ok = rc_map_add(&z->node, &node[k]) >= 0;
+  }
+  if (!z->has_nodes) z->named = calloc((size_t)z->node.key.count + 1, 1);
+  z->has_nodes = true;
   return ok && z->named;
 }
 
@@ -215,45 +269,70 @@ static void give_span(bc_zone *z, int64_t lo, int64_t hi, bool of_vertices, int3
 /* Faces all of whose nodes were named; the names end. */
 static void give_named(bc_zone *z, int32_t boundary)
 {
-  for (int64_t i = 0; i < z->num; i++) {
-    const int64_t *key = z->rim[i].key;
-    bool           in  = !is_poly(&z->rim[i]);
+  const int64_t *node;
+  int64_t        room[4];
 
-    for (int k = 0; k < 4 && key[k] >= 0 && in; k++) in = z->named[rc_map_find(&z->node, &key[k])];
+  for (int64_t i = 0; i < z->num; i++) {
+    const int64_t num = nodes_of(z, &z->rim[i], room, &node);
+    bool          in  = true;
+
+    for (int64_t k = 0; k < num && in; k++) in = z->named[rc_map_find(&z->node, &node[k])];
     if (in) give(z, i, boundary);
   }
   if (z->node.key.count) memset(z->named, 0, (size_t)z->node.key.count);
 }
 
-/* A list of numbers, in blocks. Collective. */
-static rcgns_status give_list(bc_zone *z, int64_t node, bool of_vertices, int32_t boundary, rcgns_message *message)
+/* Where numbers of a condition belong to: elements, or faces of a block across an axis; vertices. */
+typedef enum bc_where { OF_ELEMENTS = 0, OF_VERTICES = 1, OF_I_FACES, OF_J_FACES, OF_K_FACES, OF_FACES } bc_where;
+
+/* Triples of indices from 1 in a block as numbers, 0 where there is nothing; how many. */
+static int64_t number_points(const bc_zone *z, bc_where where, int64_t *number, int64_t n)
 {
+  const int64_t axis = (int64_t)where - OF_I_FACES; /* OF_VERTICES: -1 */
+
+  for (int64_t p = 0; p < n / 3; p++) {
+    const int64_t *at = number + 3 * p;
+    bool           in = true;
+
+    for (int d = 0; d < 3; d++) in = in && at[d] >= 1 && at[d] <= z->zone->vertices[d];
+    number[p] = in ? code_of(z->zone, axis, at[0] - 1, at[1] - 1, at[2] - 1) : 0;
+  }
+  return n / 3;
+}
+
+/* A list of numbers, in pieces. Collective. */
+static rcgns_status give_list(bc_zone *z, int64_t node, bc_where where, int32_t boundary, rcgns_message *message)
+{
+  enum { PIECE = BLOCK / 3 * 3 };
   const rc_node *n      = rc_node_at(&z->file->tree, node);
   const rc_box   box    = rc_whole(n);
-  int64_t       *block  = rc_alloc(BLOCK, sizeof *block);
+  int64_t       *block  = rc_alloc(PIECE, sizeof *block);
   rcgns_status   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
 
-  for (int64_t lo = 0; lo < rc_count(n) && status == RCGNS_OK; lo += BLOCK) {
-    const int64_t hi = lo + BLOCK < rc_count(n) ? lo + BLOCK : rc_count(n);
+  for (int64_t lo = 0; lo < rc_count(n) && status == RCGNS_OK; lo += PIECE) {
+    const int64_t hi = lo + PIECE < rc_count(n) ? lo + PIECE : rc_count(n);
 
     status = rc_read(z->file, RCGNS_OK, node, &box, lo, hi, 'I', block, message);
-    if (status == RCGNS_OK) give_numbers(z, block, hi - lo, of_vertices, boundary);
+    if (status != RCGNS_OK) break;
+    const int64_t num = z->zone->is_structured ? number_points(z, where, block, hi - lo) : hi - lo;
+    give_numbers(z, block, num, where == OF_VERTICES, boundary);
   }
   free(block);
   return status;
 }
 
-/* Numbers of an unstructured zone, in a list or as a range. Collective. */
-static rcgns_status give_place(bc_zone *z, int64_t node, bool is_range, bool of_vertices, int32_t boundary,
+/* A list, or numbers of an unstructured zone as a range. Collective. */
+static rcgns_status give_place(bc_zone *z, int64_t node, bool is_range, bc_where where, int32_t boundary,
                                rcgns_message *message)
 {
   const int64_t *range = is_range ? rc_small_ints(&z->file->tree, rc_node_at(&z->file->tree, node)) : NULL;
 
+  if (where == OF_VERTICES) RC_TRY(rc_agree(z->file->comm, index_nodes(z) ? RCGNS_OK : rc_no_memory(message), message));
   if (range)
-    give_span(z, range[0], range[1], of_vertices, boundary);
+    give_span(z, range[0], range[1], where == OF_VERTICES, boundary);
   else
-    RC_TRY(give_list(z, node, of_vertices, boundary, message));
-  if (of_vertices) give_named(z, boundary);
+    RC_TRY(give_list(z, node, where, boundary, message));
+  if (where == OF_VERTICES) give_named(z, boundary);
   return RCGNS_OK;
 }
 
@@ -326,6 +405,74 @@ static int32_t boundary_of(rcgns_file *file, const char *name, const char *type)
   return (int32_t)i;
 }
 
+/* ---- faces between ranks --------------------------------------------------------------------------------------------- */
+
+/* A face that was named, on its way to the rank that compares. */
+typedef struct inner_claim {
+  int64_t key[4], place; /* place: among those that came */
+} inner_claim;
+
+static int by_claim(const void *a, const void *b)
+{
+  const inner_claim *x = a, *y = b;
+
+  for (int k = 0; k < 4; k++)
+    if (x->key[k] != y->key[k]) return x->key[k] < y->key[k] ? -1 : 1;
+  return (x->place > y->place) - (x->place < y->place);
+}
+
+/* Is this rim named, and may another rank have it too? Its claim. */
+static bool is_claimed(const bc_zone *z, int64_t i, inner_claim *c)
+{
+  const rc_rim *rim = &z->rim[i];
+
+  *c = (inner_claim){.key = {rim->key[0], rim->key[1], is_poly(rim) ? -1 : rim->key[2], is_poly(rim) ? -1 : rim->key[3]}};
+  return z->file->face_boundary[rim->face] >= 0;
+}
+
+/* For each of n claims: did it come twice? */
+static void find_twice(inner_claim *claim, int64_t n, uint8_t *twice)
+{
+  for (int64_t i = 0; i < n; i++) claim[i].place = i, twice[i] = 0;
+  qsort(claim, (size_t)n, sizeof *claim, by_claim);
+  for (int64_t i = 1; i < n; i++)
+    if (!memcmp(claim[i].key, claim[i - 1].key, sizeof claim->key)) twice[claim[i].place] = twice[claim[i - 1].place] = 1;
+}
+
+/* Faces between cells of two ranks are inside of the zone: on one rank they would have no name. Collective. */
+static rcgns_status unname_inner(bc_zone *z, rcgns_message *message)
+{
+  const int    size  = z->file->size;
+  int64_t     *count = calloc(3 * (size_t)size + 1, sizeof *count), *recv = count ? count + 2 * size : NULL, num = 0, total = 0;
+  inner_claim *send = NULL, one;
+  uint8_t     *twice = NULL;
+  void        *got = NULL, *back = NULL;
+  rcgns_status status = count ? RCGNS_OK : rc_no_memory(message);
+
+  for (int64_t i = 0; i < z->num && count; i++)
+    if (is_claimed(z, i, &one)) count[one.key[0] % size]++, num++;
+  for (int r = 1; r < size && count; r++) count[size + r] = count[size + r - 1] + count[r - 1];
+  if (!(send = rc_alloc(num, sizeof *send))) status = rc_no_memory(message);
+  for (int64_t i = 0; i < z->num && status == RCGNS_OK; i++)
+    if (is_claimed(z, i, &one)) send[count[size + one.key[0] % size]++] = one;
+  RC_GOTO(done, status = rc_exchange(z->file->comm, status, send, count, sizeof *send, &got, recv, message));
+  for (int r = 0; r < size; r++) total += recv[r];
+  if (!(twice = rc_alloc(total, sizeof *twice))) status = rc_no_memory(message);
+  else find_twice(got, total, twice);
+  RC_GOTO(done, status = rc_exchange(z->file->comm, status, twice, recv, sizeof *twice, &back, count, message));
+  for (int64_t i = 0, r = 0; r < size; i += count[r++]) count[size + r] = i;
+  for (int64_t i = 0; i < z->num; i++)
+    if (is_claimed(z, i, &one) && ((const uint8_t *)back)[count[size + one.key[0] % size]++])
+      z->file->face_boundary[z->rim[i].face] = -1;
+done:
+  free(count);
+  free(send);
+  free(twice);
+  free(got);
+  free(back);
+  return status;
+}
+
 /* ---- the whole ------------------------------------------------------------------------------------------------------- */
 
 /* The node that says where a condition is; *is_elements: its numbers are element numbers whatever the location. */
@@ -344,26 +491,41 @@ static int64_t place_of(const rc_tree *tree, int64_t bc, bool *is_range, bool *i
   return -1;
 }
 
+static bc_where where_of(const rc_tree *tree, int64_t bc, bool is_structured, bool is_elements)
+{
+  char location[RC_NAME];
+
+  rc_tree_string(tree, rc_tree_find(tree, bc, -1, "GridLocation_t", NULL), location, sizeof location);
+  if (is_elements) return OF_ELEMENTS;
+  if (!*location || !strcmp(location, "Vertex")) return OF_VERTICES;
+  if (!is_structured) return OF_ELEMENTS;
+  return !strcmp(location, "IFaceCenter")   ? OF_I_FACES
+         : !strcmp(location, "JFaceCenter") ? OF_J_FACES
+         : !strcmp(location, "KFaceCenter") ? OF_K_FACES
+                                            : OF_FACES;
+}
+
 /* One condition of a zone. Collective. */
 static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
 {
   const rc_tree *tree     = &z->file->tree;
-  bool           is_range = false, is_elements = false, of_vertices;
+  bool           is_range = false, is_elements = false;
   const int64_t  place = place_of(tree, bc, &is_range, &is_elements);
-  char           type[RC_NAME], location[RC_NAME], text[240];
+  const bool     is_block = z->zone->is_structured;
+  const bc_where where    = where_of(tree, bc, is_block, is_elements);
+  char           type[RC_NAME], text[240];
   int32_t        boundary;
 
   type_of(tree, z->zone, bc, type);
-  rc_tree_string(tree, rc_tree_find(tree, bc, -1, "GridLocation_t", NULL), location, sizeof location);
-  of_vertices = !is_elements && (!*location || !strcmp(location, "Vertex"));
-  boundary    = boundary_of(z->file, rc_node_at(tree, bc)->name, type);
+  boundary = boundary_of(z->file, rc_node_at(tree, bc)->name, type);
   RC_TRY(rc_agree(z->file->comm, boundary < 0 ? rc_no_memory(message) : RCGNS_OK, message));
-  if (place >= 0 && z->zone->is_structured && is_range && rc_count(rc_node_at(tree, place)) == 6) {
-    give_range(z, rc_small_ints(tree, rc_node_at(tree, place)), of_vertices, boundary);
+  if (place >= 0 && is_block && is_range && rc_count(rc_node_at(tree, place)) == 6) {
+    give_range(z, rc_small_ints(tree, rc_node_at(tree, place)), where == OF_VERTICES, boundary);
     return RCGNS_OK;
   }
-  if (place >= 0 && !z->zone->is_structured && !(of_vertices && z->zone->num_face_sections))
-    return give_place(z, place, is_range, of_vertices, boundary, message);
+  if (place >= 0 && (!is_block || (!is_range && where != OF_ELEMENTS && where != OF_FACES &&
+                                   rc_count(rc_node_at(tree, place)) % 3 == 0)))
+    return give_place(z, place, is_range, where, boundary, message);
   snprintf(text, sizeof text, "zone %.60s: boundary condition %s is left out: its place is given in a way that is not read",
            z->zone->name, rc_node_at(tree, bc)->name);
   return rc_note(z->file, message, text);
@@ -381,6 +543,7 @@ static rcgns_status read_zone(rcgns_file *file, const rc_zone *zone, rc_rim *rim
   while (status == RCGNS_OK && (list = rc_tree_find(&file->tree, zone->node, list, "ZoneBC_t", NULL)) >= 0)
     for (int64_t bc = -1; status == RCGNS_OK && (bc = rc_tree_find(&file->tree, list, bc, "BC_t", NULL)) >= 0;)
       status = read_bc(&z, bc, message);
+  if (status == RCGNS_OK && !zone->is_structured && file->size > 1) status = unname_inner(&z, message);
   drop_zone(&z);
   return status;
 }

@@ -754,4 +754,5 @@ void rc_mesh_drop(rc_mesh *mesh)
   rc_drop(&mesh->face_neighbour);
   rc_drop(&mesh->cell_global);
   rc_drop(&mesh->rim);
+  rc_drop(&mesh->rim_node);
 }

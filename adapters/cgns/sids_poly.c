@@ -19,6 +19,8 @@ typedef struct polys {
   rc_map   faces;         /* face of the zone -> local face */
   rc_array ref;           /* [local faces][2] where in `face` the cells that have it list it, -1 */
   rc_array loop_at, loop; /* [local faces + 1], nodes: of the zone, later of this rank's mesh */
+  rc_map   nodes;         /* node of the zone -> node of this rank's mesh less first_node */
+  int64_t  first_node;
 } polys;
 
 static int64_t *ints_of(const rc_array *array) { return array->item; }
@@ -29,6 +31,7 @@ static void drop_polys(polys *p)
   rc_drop(&p->face);
   rc_drop(&p->sign);
   rc_map_drop(&p->faces);
+  rc_map_drop(&p->nodes);
   rc_drop(&p->ref);
   rc_drop(&p->loop_at);
   rc_drop(&p->loop);
@@ -358,22 +361,23 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, polys *p, rcgn
 {
   rc_array    *xyz    = &file->build.xyz;
   int64_t     *loop   = p->loop.item;
-  rc_map       nodes  = {.width = 1};
+  rc_map      *nodes  = &p->nodes;
   rcgns_status status = RCGNS_OK;
 
+  nodes->width  = 1;
+  p->first_node = xyz->count;
   for (int64_t i = 0; i < p->loop.count && status == RCGNS_OK; i++) {
-    const int64_t local = rc_map_add(&nodes, &loop[i]);
+    const int64_t local = rc_map_add(nodes, &loop[i]);
 
     if (local < 0) status = rc_no_memory(message);
     loop[i] = xyz->count + local;
   }
-  if (status == RCGNS_OK && !rc_reserve(xyz, nodes.key.count, 3 * sizeof(double))) status = rc_no_memory(message);
-  for (int64_t i = 0; i < nodes.key.count && status == RCGNS_OK; i++)
-    if (!rc_number_node(file, zone, ((const int64_t *)nodes.key.item)[i])) status = rc_no_memory(message);
+  if (status == RCGNS_OK && !rc_reserve(xyz, nodes->key.count, 3 * sizeof(double))) status = rc_no_memory(message);
+  for (int64_t i = 0; i < nodes->key.count && status == RCGNS_OK; i++)
+    if (!rc_number_node(file, zone, ((const int64_t *)nodes->key.item)[i])) status = rc_no_memory(message);
   status =
-      rc_nodes_fetch(file, status, zone, nodes.key.item, nodes.key.count, (double *)xyz->item + 3 * xyz->count, NULL, message);
-  if (status == RCGNS_OK) xyz->count += nodes.key.count;
-  rc_map_drop(&nodes);
+      rc_nodes_fetch(file, status, zone, nodes->key.item, nodes->key.count, (double *)xyz->item + 3 * xyz->count, NULL, message);
+  if (status == RCGNS_OK) xyz->count += nodes->key.count;
   return status;
 }
 
@@ -555,6 +559,17 @@ static int64_t distinct(const int64_t *loop, int64_t n)
   return count;
 }
 
+/* The face that was added last, number f here, is at the rim. */
+static bool add_rim(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t f)
+{
+  const int64_t *node  = p->nodes.key.item;
+  const int64_t  begin = mesh->rim_node.count;
+
+  for (int64_t k = ints_of(&p->loop_at)[f]; k < ints_of(&p->loop_at)[f + 1]; k++)
+    if (!rc_push(&mesh->rim_node, node[ints_of(&p->loop)[k] - p->first_node])) return false;
+  return rc_rim_add(mesh, zone, number_of(zone, ints_of(&p->faces.key)[f]), -1, begin, mesh->rim_node.count);
+}
+
 static bool emit(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t first_cell)
 {
   const int64_t *sign = p->sign.item, *ref = p->ref.item;
@@ -571,7 +586,7 @@ static bool emit(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t fir
       continue;
     }
     ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), -1) &&
-         rc_rim_add(mesh, zone, number_of(zone, ints_of(&p->faces.key)[f]), -1, -1, -1);
+         add_rim(mesh, zone, p, f);
     if (ok && b >= 0) ok = rc_face_add(mesh, loop, n, sign[b] < 0, first_cell + cell_of(p, b), -1);
   }
   return ok;

@@ -42,7 +42,8 @@ cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side,
     mine[f] = from->face && from->face[f] >= 0 ? number[from->face[f]] : -1;
   if (code == CLI_DONE) {
     status = remap_supermesh_face_values(ctx, side, mine, -1, taken);
-    if (status != REMAP_OK) code = cli_fail(why, CLI_INTERNAL, "%s: %s", mesh->name ? mesh->name : "mesh", remap_status_text(status));
+    if (status != REMAP_OK)
+      code = cli_fail(why, CLI_INTERNAL, "%s: %s", mesh->name ? mesh->name : "a mesh", remap_status_text(status));
   }
   for (int64_t f = 0; code == CLI_DONE && f < to->num_faces; f++)
     if (to->face[f] < 0) to->face[f] = taken[f];

@@ -79,12 +79,13 @@ static void put_loop(rows *r, const remap_supermesh_view *m, int64_t face, bool 
 
 rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_rows *out)
 {
-  const remap_supermesh_view *m      = content->mesh;
-  int64_t                    *behind = cells_behind(m);
-  rows                        r      = {.num = 0};
-  rslice_status               status = RSLICE_OK;
+  const remap_supermesh_view *m       = content->mesh;
+  const int64_t               corners = m->num_faces ? m->face_offset[m->num_faces] : 0;
+  int64_t                    *behind  = cells_behind(m);
+  rows                        r       = {.num = 0};
+  rslice_status               status  = RSLICE_OK;
 
-  if (!behind || !rows_begin(&r, m->num_faces, RSLICE_FACE_HEAD * m->num_faces + (m->num_faces ? m->face_offset[m->num_faces] : 0)))
+  if (!behind || !rows_begin(&r, m->num_faces, RSLICE_FACE_HEAD * m->num_faces + corners))
     status = RSLICE_MEMORY;
   for (int64_t f = 0; status == RSLICE_OK && f < m->num_faces; f++) {
     const int64_t mine = m->cell_global[m->face_owner[f]], other = behind[f];

@@ -36,7 +36,8 @@ near "$(area corner.obj unnamed)" 0.75 1e-14
 hold "$wrong" "names come through a CGNS file with the faces that they belong to"
 
 for n in 1 3; do
-  "$mpiexec" "$numproc_flag" "$n" "$transfer" -q corner.cgns mesh.cgns -o out.cgns --supermesh "super$n.cgns" || complain "remap fails"
+  "$mpiexec" "$numproc_flag" "$n" "$transfer" -q corner.cgns mesh.cgns -o out.cgns --supermesh "super$n.cgns" ||
+    complain "remap fails"
 done
 cmp -s super1.cgns super3.cgns || complain "other bytes on 3 ranks"
 checked super1.cgns

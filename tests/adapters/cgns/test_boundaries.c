@@ -1,5 +1,5 @@
-/* Boundary conditions: which faces they name, by ranges in blocks, by lists of elements and vertices elsewhere, on any number
- * of ranks; what cannot be read is noted and left out. */
+/* Boundary conditions: which faces they name, by ranges and lists of indices, elements and vertices, on any number of ranks;
+ * what cannot be read is noted and left out. */
 #include "files.h"
 
 #include "../slices/blocks.h"
@@ -65,7 +65,7 @@ static void blocks_name_faces_by_ranges(void)
   put_bc(f, list, "again", "BCOutflow", "PointRange", 2, two_by_three, (int64_t[]){3, 1, 1, 3, 4, 5}, NULL);
   put_bc(f, list, "edge", "BCWall", "PointRange", 2, two_by_three, (int64_t[]){1, 1, 1, 1, 1, 5}, NULL);
   put_bc(f, list, "inside", "BCWall", "PointRange", 2, two_by_three, (int64_t[]){2, 1, 1, 2, 4, 5}, NULL);
-  put_bc(f, list, "odd", "Nonsense", "PointList", 2, (int64_t[]){1, 3}, (int64_t[]){1, 1, 1}, NULL);
+  put_bc(f, list, "odd", "Nonsense", "PointList", 2, (int64_t[]){1, 3}, (int64_t[]){1, 1, 1}, "FaceCenter");
   cf_text(f, put_bc(f, list, "slip", "FamilySpecified", "PointRange", 2, two_by_three, (int64_t[]){1, 1, 1, 3, 1, 5}, NULL),
           "FamilyName", "FamilyName_t", "Slip");
   cf_write(f, cf_path(path, "bc_block"));
@@ -86,6 +86,41 @@ static void blocks_name_faces_by_ranges(void)
     RT_CHECK(cf_has_note(file, "odd"));
     RT_EQ(rcgns_read_boundaries(file, &b, &why), RCGNS_OK);
     RT_EQ(b.num, 8);
+  }
+  rcgns_close(&file);
+  cf_remove(path);
+}
+
+static void blocks_name_faces_by_lists(void)
+{
+  const int64_t square[18] = {1, 2, 1, 1, 1, 1, 2, 2, 2, 1, 1, 2, 1, 2, 2, 3, 4, 5}, below[6] = {1, 1, 1, 2, 3, 1};
+  const int64_t edge[12] = {3, 4, 5, 3, 3, 5, 3, 4, 4, 2, 3, 4}, wild[12] = {0, 1, 1, 4, 1, 1, 1, 1, -3, 1, INT32_MAX, 1};
+  cf_file      *f     = cf_new(3.4);
+  const int64_t block = cf_zone(f, cf_base(f), "Block", 3, (int64_t[]){3, 4, 5, 2, 3, 4, 0, 0, 0});
+  const int64_t list  = cf_empty(f, block, "ZoneBC", "ZoneBC_t");
+  double        xyz[180], area;
+  char          path[64];
+  rcgns_file   *file;
+
+  for (int i = 0; i < 60; i++) xyz[3 * i] = i % 3, xyz[3 * i + 1] = i / 3 % 4, xyz[3 * i + 2] = i / 12;
+  cf_coordinates(f, block, xyz, 3, (int64_t[]){5, 4, 3});
+  put_bc(f, list, "square", "BCWall", "PointList", 2, (int64_t[]){6, 3}, square, NULL);
+  put_bc(f, list, "below", "BCWall", "PointList", 2, (int64_t[]){2, 3}, below, "KFaceCenter");
+  put_bc(f, list, "inside", "BCWall", "PointList", 2, (int64_t[]){2, 3}, below, "JFaceCenter");
+  put_bc(f, list, "edge", "BCWall", "PointList", 2, (int64_t[]){4, 3}, edge, "Vertex");
+  put_bc(f, list, "wild", "BCWall", "PointList", 2, (int64_t[]){4, 3}, wild, "Vertex");
+  put_bc(f, list, "wilder", "BCWall", "PointList", 2, (int64_t[]){4, 3}, wild, "IFaceCenter");
+  cf_write(f, cf_path(path, "bc_points"));
+  file = cf_open(path, NULL);
+  if (file) {
+    rcgns_boundaries b;
+
+    RT_EQ(rcgns_read_boundaries(file, &b, &why), RCGNS_OK);
+    RT_EQ(faces_of(file, &b, "square", "BCWall", &area), 1);
+    RT_EQ(faces_of(file, &b, "below", "BCWall", &area), 2);
+    RT_EQ(faces_of(file, &b, "inside", "BCWall", &area), 1);
+    for (int i = 3; i < 6; i++) RT_EQ(faces_of(file, &b, b.name[i], "BCWall", &area), 0);
+    RT_CHECK(!cf_has_note(file, "left out"));
   }
   rcgns_close(&file);
   cf_remove(path);
@@ -148,5 +183,45 @@ static void polyhedra_are_named_by_lists_of_faces(void)
   bl_free(blocks);
 }
 
-RT_MAIN(RT_CASE(blocks_name_faces_by_ranges), RT_CASE(elements_are_named_by_lists_of_faces_and_vertices),
-        RT_CASE(polyhedra_are_named_by_lists_of_faces))
+static void polyhedra_are_named_by_vertices(void)
+{
+  /* two cubes side by side; node 1 + x + 3 y + 6 z */
+  static const int64_t node[44] = {1, 7,  10, 4, 2, 5, 11, 8, 3, 6, 12, 9, 1, 2, 8,  7,  2, 3, 9,  8,  4,  10,
+                                   11, 5, 5, 11, 12, 6, 1, 4, 5, 2, 2, 5, 6, 3,  7,  8, 11, 10, 8,  9,  12, 11};
+  static const int64_t cell[12] = {1, 2, 4, 6, 8, 10, -2, 3, 5, 7, 9, 11}, cut[3] = {0, 6, 12};
+  cf_file             *f        = cf_new(4.2);
+  const int64_t        zone     = cf_zone(f, cf_base(f), "Pair", 1, (int64_t[]){12, 2, 0});
+  const int64_t        list     = cf_empty(f, zone, "ZoneBC", "ZoneBC_t");
+  int64_t              at[12];
+  double               xyz[36], area;
+  char                 path[64];
+  rcgns_file          *file;
+
+  for (int i = 0; i < 12; i++) at[i] = 4 * i, xyz[3 * i] = i % 3, xyz[3 * i + 1] = i / 3 % 2, xyz[3 * i + 2] = i / 6;
+  cf_coordinates(f, zone, xyz, 1, (int64_t[]){12});
+  cf_offsets(f, cf_section(f, zone, "Faces", 22, 1, 11, 44, node), 12, at);
+  cf_offsets(f, cf_section(f, zone, "Cells", 23, 12, 13, 12, cell), 3, cut);
+  put_bc(f, list, "front", "BCWall", "PointList", 2, (int64_t[]){6, 1}, (int64_t[]){9, 8, 7, 1, 2, 3}, "Vertex");
+  put_bc(f, list, "row", "BCWall", "PointList", 2, (int64_t[]){3, 1}, (int64_t[]){4, 5, 6}, NULL);
+  put_bc(f, list, "below", "BCInflow", "PointRange", 2, (int64_t[]){2, 1}, (int64_t[]){1, 6}, NULL);
+  put_bc(f, list, "joint", "BCWall", "PointList", 2, (int64_t[]){4, 1}, (int64_t[]){2, 5, 11, 8}, NULL);
+  cf_write(f, cf_path(path, "bc_pair"));
+  file = cf_open(path, NULL);
+  if (file) {
+    rcgns_boundaries b;
+
+    RT_EQ(rcgns_read_boundaries(file, &b, &why), RCGNS_OK);
+    RT_EQ(faces_of(file, &b, "front", "BCWall", &area), 2);
+    RT_NEAR(area, 2, 1e-14);
+    RT_EQ(faces_of(file, &b, "row", "BCWall", &area), 0);
+    RT_EQ(faces_of(file, &b, "below", "BCInflow", &area), 2);
+    RT_EQ(faces_of(file, &b, "joint", "BCWall", &area), 0);
+    RT_CHECK(!cf_has_note(file, "left out"));
+  }
+  rcgns_close(&file);
+  cf_remove(path);
+}
+
+RT_MAIN(RT_CASE(blocks_name_faces_by_ranges), RT_CASE(blocks_name_faces_by_lists),
+        RT_CASE(elements_are_named_by_lists_of_faces_and_vertices), RT_CASE(polyhedra_are_named_by_lists_of_faces),
+        RT_CASE(polyhedra_are_named_by_vertices))

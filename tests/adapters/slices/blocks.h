@@ -4,8 +4,9 @@
  *   rvtk_write(comm, path, &b->content, &message);
  *   bl_free(b);
  *
- * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. Every face lies in one of
- * the source, every third in one of the target. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the program. */
+ * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. Every face lies in one of the source, every
+ * third in one of the target. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the
+ * program. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
 
