@@ -2,8 +2,8 @@
  *
  * Everything here is linear in what it is given. An agreement is one reduction, plus one broadcast after a failure. */
 #include "cgns_private.h"
+#include "slices.h"
 
-#include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -189,47 +189,12 @@ int rc_owner(int64_t n, int64_t i, int size)
   return (int)(i < rest * (each + 1) ? i / (each + 1) : rest + (i - rest * (each + 1)) / each);
 }
 
-/* Displacements of counts; false if they pass what one call of MPI can move. */
-static bool displace(const int64_t *count, int size, int *n, int *at)
-{
-  int64_t sum = 0;
-
-  for (int r = 0; r < size; r++) {
-    at[r] = (int)sum;
-    n[r]  = (int)count[r];
-    sum += count[r];
-    if (count[r] < 0 || sum > INT_MAX) return false;
-  }
-  return true;
-}
-
 rcgns_status rc_exchange(MPI_Comm comm, rcgns_status mine, const void *send, const int64_t *send_count, size_t size,
                          void **received, int64_t *recv_count, rcgns_message *message)
 {
-  rcgns_status status = mine;
-  int          ranks, *n = NULL;
-  void        *in     = NULL;
-  MPI_Datatype record = MPI_DATATYPE_NULL;
-  int64_t      total  = 0;
+  rslice_status status;
 
-  MPI_Comm_size(comm, &ranks);
-  if (status == RCGNS_OK && !(n = rc_alloc(4 * (int64_t)ranks, sizeof *n))) status = rc_no_memory(message);
-  RC_GOTO(done, status = rc_agree(comm, status, message));
-  MPI_Alltoall(send_count, 1, MPI_INT64_T, recv_count, 1, MPI_INT64_T, comm);
-  for (int r = 0; r < ranks; r++) total += recv_count[r];
-  if (!displace(send_count, ranks, n, n + ranks) || !displace(recv_count, ranks, n + 2 * ranks, n + 3 * ranks))
-    status = rc_fail(message, RCGNS_MEMORY, "more cells than one rank can hold: use more ranks");
-  else if (!(in = rc_alloc(total, size)))
-    status = rc_no_memory(message);
-  RC_GOTO(done, status = rc_agree(comm, status, message));
-  MPI_Type_contiguous((int)size, MPI_BYTE, &record);
-  MPI_Type_commit(&record);
-  MPI_Alltoallv(send, n, n + ranks, record, in, n + 2 * ranks, n + 3 * ranks, record, comm);
-  MPI_Type_free(&record);
-  *received = in;
-  in        = NULL;
-done:
-  free(in);
-  free(n);
-  return status;
+  RC_TRY(rc_agree(comm, mine, message));
+  status = rslice_exchange(comm, RSLICE_OK, RSLICE_CHUNK, size, send_count, send, recv_count, received);
+  return status == RSLICE_OK ? RCGNS_OK : rc_no_memory(message);
 }

@@ -1,7 +1,6 @@
 /* ship -- rows to the ranks that write them: two exchanges, one of numbers and lengths, one of words. Linear. */
 #include "slices.h"
 
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -31,63 +30,6 @@ static int owner_of(int64_t n, int64_t i, int size)
   return (int)(i < rest * (each + 1) ? i / (each + 1) : rest + (i - rest * (each + 1)) / each);
 }
 
-static rslice_status agree(MPI_Comm comm, rslice_status mine)
-{
-  int status = (int)mine;
-
-  MPI_Allreduce(MPI_IN_PLACE, &status, 1, MPI_INT, MPI_MAX, comm);
-  return (rslice_status)status;
-}
-
-/* calloc, never NULL for 0 items. */
-static void *room(int64_t count, size_t size) { return count < 0 ? NULL : calloc((size_t)count + 1, size); }
-
-/* One exchange under way: how many words go to and come from each rank, and where they stand. */
-typedef struct traffic {
-  int     *send, *send_at, *recv, *recv_at; /* [ranks] */
-  int64_t *in;                              /* words that came */
-} traffic;
-
-static rslice_status exchange(MPI_Comm comm, int size, const int64_t *count, const int64_t *out, traffic *t)
-{
-  int64_t       send = 0, recv = 0;
-  rslice_status status = RSLICE_OK;
-
-  for (int r = 0; r < size; r++) {
-    if (count[r] > INT_MAX) status = RSLICE_TOO_LARGE;
-    t->send[r] = (int)count[r];
-  }
-  if (agree(comm, status) != RSLICE_OK) return RSLICE_TOO_LARGE;
-  MPI_Alltoall(t->send, 1, MPI_INT, t->recv, 1, MPI_INT, comm);
-  for (int r = 0; r < size; r++) {
-    t->send_at[r] = (int)send;
-    t->recv_at[r] = (int)recv;
-    send += t->send[r];
-    recv += t->recv[r];
-    if (send > INT_MAX || recv > INT_MAX) status = RSLICE_TOO_LARGE;
-  }
-  if (status == RSLICE_OK && !(t->in = room(recv, sizeof *t->in))) status = RSLICE_MEMORY;
-  status = agree(comm, status);
-  if (status == RSLICE_OK) MPI_Alltoallv(out, t->send, t->send_at, MPI_INT64_T, t->in, t->recv, t->recv_at, MPI_INT64_T, comm);
-  return status;
-}
-
-static rslice_status traffic_begin(int size, traffic *t)
-{
-  *t = (traffic){.send = room(4 * (int64_t)size, sizeof *t->send)};
-  if (!t->send) return RSLICE_MEMORY;
-  t->send_at = t->send + size;
-  t->recv    = t->send + 2 * size;
-  t->recv_at = t->send + 3 * size;
-  return RSLICE_OK;
-}
-
-static void traffic_end(traffic *t)
-{
-  free(t->send);
-  free(t->in);
-}
-
 /* What goes out, sorted by rank: {number, length} of each row, and the words. */
 typedef struct parcels {
   int64_t *head, *word;           /* [rows][2], [words] */
@@ -107,9 +49,9 @@ static rslice_status pack(int size, int64_t total, int64_t num, const int64_t *g
 {
   const int64_t base = num ? offset[0] : 0;
 
-  p->head      = room(2 * num, sizeof *p->head);
-  p->word      = room(num ? offset[num] - base : 0, sizeof *p->word);
-  p->num_heads = room(4 * (int64_t)size, sizeof *p->num_heads);
+  p->head      = rslice_room(2 * num, sizeof *p->head);
+  p->word      = rslice_room(num ? offset[num] - base : 0, sizeof *p->word);
+  p->num_heads = rslice_room(4 * (int64_t)size, sizeof *p->num_heads);
   if (!p->head || !p->word || !p->num_heads) return RSLICE_MEMORY;
   p->num_words = p->num_heads + size;
   p->next_head = p->num_heads + 2 * size;
@@ -139,9 +81,9 @@ static rslice_status pack(int size, int64_t total, int64_t num, const int64_t *g
 /* What came, in the order of the rows. */
 static rslice_status unpack(const int64_t *head, int64_t num, const int64_t *word, rslice_rows *out)
 {
-  int64_t *from = room(out->num, sizeof *from), at = 0;
+  int64_t *from = rslice_room(out->num, sizeof *from), at = 0;
 
-  out->offset = room(out->num + 1, sizeof *out->offset);
+  out->offset = rslice_room(out->num + 1, sizeof *out->offset);
   if (!from || !out->offset) {
     free(from);
     return RSLICE_MEMORY;
@@ -160,41 +102,45 @@ static rslice_status unpack(const int64_t *head, int64_t num, const int64_t *wor
     free(from);
     return RSLICE_INTERNAL;
   }
-  out->word = room(out->offset[out->num], sizeof *out->word);
+  out->word = rslice_room(out->offset[out->num], sizeof *out->word);
   for (int64_t i = 0; out->word && i < out->num; i++)
     memcpy(out->word + out->offset[i], word + from[i], (size_t)(out->offset[i + 1] - out->offset[i]) * sizeof *word);
   free(from);
   return out->word ? RSLICE_OK : RSLICE_MEMORY;
 }
 
-rslice_status rslice_ship(MPI_Comm comm, rslice_status mine, int64_t total, int64_t num, const int64_t *global,
-                          const int64_t *offset, const int64_t *word, rslice_rows *out)
+rslice_status rslice_ship_chunked(MPI_Comm comm, rslice_status mine, int64_t chunk, int64_t total, int64_t num,
+                                  const int64_t *global, const int64_t *offset, const int64_t *word, rslice_rows *out)
 {
   parcels       p     = {.head = NULL};
-  traffic       heads = {.in = NULL}, words = {.in = NULL};
   rslice_status status = mine;
   int           rank, size;
-  int64_t       num_in = 0;
+  int64_t      *recv_count = NULL, num_in = 0;
+  void         *heads = NULL, *words = NULL;
 
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &size);
   *out     = (rslice_rows){.first = rslice_begin(total, rank, size)};
   out->num = rslice_begin(total, rank + 1, size) - out->first;
   if (status == RSLICE_OK) status = pack(size, total, num, global, offset, word, &p);
-  if (status == RSLICE_OK) status = traffic_begin(size, &heads);
-  if (status == RSLICE_OK) status = traffic_begin(size, &words);
-  status = agree(comm, status);
-  if (status == RSLICE_OK) status = exchange(comm, size, p.num_heads, p.head, &heads);
-  if (status == RSLICE_OK) status = exchange(comm, size, p.num_words, p.word, &words);
-  if (status == RSLICE_OK) {
-    for (int r = 0; r < size; r++) num_in += heads.recv[r] / 2;
-    status = agree(comm, unpack(heads.in, num_in, words.in, out));
-  }
+  if (status == RSLICE_OK && !(recv_count = rslice_room(size, sizeof *recv_count))) status = RSLICE_MEMORY;
+  status = rslice_exchange(comm, status, chunk, sizeof *p.head, p.num_heads, p.head, recv_count, &heads);
+  for (int r = 0; r < size && status == RSLICE_OK; r++) num_in += recv_count[r] / 2;
+  status = rslice_exchange(comm, status, chunk, sizeof *p.word, p.num_words, p.word, recv_count, &words);
+  if (status == RSLICE_OK) status = unpack(heads, num_in, words, out);
+  status = rslice_agree(comm, status);
   parcels_drop(&p);
-  traffic_end(&heads);
-  traffic_end(&words);
+  free(recv_count);
+  free(heads);
+  free(words);
   if (status != RSLICE_OK) rslice_drop(out);
   return status;
+}
+
+rslice_status rslice_ship(MPI_Comm comm, rslice_status mine, int64_t total, int64_t num, const int64_t *global,
+                          const int64_t *offset, const int64_t *word, rslice_rows *out)
+{
+  return rslice_ship_chunked(comm, mine, RSLICE_CHUNK, total, num, global, offset, word, out);
 }
 
 void rslice_drop(rslice_rows *rows)

@@ -19,10 +19,9 @@ extern "C" {
 #endif
 
 /** Every status: name, number, text. The greater one wins when ranks differ. */
-#define RSLICE_STATUS_LIST(X)                                         \
-  X(OK, 0, "success")                                                 \
-  X(TOO_LARGE, 1, "more rows than one rank can send: use more ranks") \
-  X(MEMORY, 2, "memory could not be allocated: use more ranks")       \
+#define RSLICE_STATUS_LIST(X)                                   \
+  X(OK, 0, "success")                                           \
+  X(MEMORY, 2, "memory could not be allocated: use more ranks") \
   X(INTERNAL, 3, "the numbers of the supermesh leave gaps")
 
 typedef enum rslice_status {
@@ -33,6 +32,22 @@ typedef enum rslice_status {
 
 /** A short text for a status; static text, never NULL. Not collective. */
 const char *rslice_status_text(rslice_status status);
+
+/** The greatest status of all ranks. Collective on comm. */
+rslice_status rslice_agree(MPI_Comm comm, rslice_status mine);
+
+/** calloc, never NULL for 0 items; NULL: no memory, or a count below 0. Not collective. */
+void *rslice_room(int64_t count, size_t size);
+
+/** Bytes of one message at most: MPI counts in int. */
+#define RSLICE_CHUNK ((int64_t)1 << 30)
+
+/** Records of `size` bytes to every rank and back: send holds send_count[r] records for rank r, r ascending; *recv, the
+ *  caller's (free), those of each rank in the same order, and recv_count [ranks] how many. Messages have at most chunk bytes, 1
+ *  to RSLICE_CHUNK, the same on all ranks. mine is the caller's own status so far, so that a rank in trouble takes the others
+ *  with it; if it is not OK its pointers are not looked at. Collective on comm. Errors: mine of any rank, MEMORY. */
+rslice_status rslice_exchange(MPI_Comm comm, rslice_status mine, int64_t chunk, size_t size, const int64_t *send_count,
+                              const void *send, int64_t *recv_count, void **recv);
 
 /** A cell field of a supermesh. */
 typedef struct rslice_field {
@@ -68,6 +83,10 @@ int64_t rslice_begin(int64_t n, int rank, int size);
  *  in trouble takes the others with it. Collective on comm. Errors: those of the list; *out is then empty. */
 rslice_status rslice_ship(MPI_Comm comm, rslice_status mine, int64_t total, int64_t num, const int64_t *global,
                           const int64_t *offset, const int64_t *word, rslice_rows *out);
+
+/** The same in messages of at most chunk bytes. */
+rslice_status rslice_ship_chunked(MPI_Comm comm, rslice_status mine, int64_t chunk, int64_t total, int64_t num,
+                                  const int64_t *global, const int64_t *offset, const int64_t *word, rslice_rows *out);
 
 /** Give rows back; harmless on none. Not collective. */
 void rslice_drop(rslice_rows *rows);

@@ -331,17 +331,44 @@ static void ranges_of_boxes_of_billions_are_cut_without_gap(void)
   }
 }
 
-static void exchanges_beyond_one_call_of_mpi_are_refused_on_every_rank(void)
+/* The last rank sends the first so many records of one byte, most of them 0. */
+static rcgns_status send_down(int64_t num, bool *came)
 {
-  int64_t      *count = tm_alloc_(2 * (int64_t)rt_size(), sizeof *count);
-  void         *got   = NULL;
-  rcgns_message why   = {""};
+  const bool    is_last = rt_rank() == rt_size() - 1;
+  int64_t      *count   = tm_alloc_(2 * (int64_t)rt_size(), sizeof *count), *got_count = count + rt_size();
+  char         *send = is_last ? calloc((size_t)num, 1) : NULL, *got = NULL;
+  rcgns_message why  = {""};
+  void         *in   = NULL;
+  rcgns_status  status;
 
-  count[0] = rt_rank() == rt_size() - 1 ? (INT64_C(1) << 31) + 1 : 0; /* nothing is sent: the counts are refused before */
-  RT_EQ(rc_exchange(MPI_COMM_WORLD, RCGNS_OK, NULL, count, 1, &got, count + rt_size(), &why), RCGNS_MEMORY);
-  RT_CHECK(strstr(why.text, "use more ranks") != NULL);
-  RT_CHECK(!got);
-  free(count);
+  count[0] = is_last ? num : 0;
+  if (send) send[num - 1] = 'z';
+  status = rc_exchange(MPI_COMM_WORLD, RCGNS_OK, send, count, 1, &in, got_count, &why);
+  got    = in;
+  *came  = rt_rank() || (got && got_count[rt_size() - 1] == num && got[0] == 0 && got[num - 1] == 'z');
+  RT_CHECK((status == RCGNS_OK) == (strstr(why.text, "use more ranks") == NULL));
+  RT_CHECK((status == RCGNS_OK) == (in != NULL));
+  free(send), free(in), free(count);
+  return status;
+}
+
+static void exchanges_beyond_one_message_of_mpi_are_made_of_several(void)
+{
+  bool came;
+
+  if (!rt_long()) {
+    rt_skip("it takes 4 GB");
+    return;
+  }
+  RT_EQ(send_down((INT64_C(1) << 31) + 5, &came), RCGNS_OK);
+  RT_CHECK(came);
+}
+
+static void exchanges_beyond_all_memory_are_refused_on_every_rank(void)
+{
+  bool came;
+
+  RT_EQ(send_down(INT64_C(1) << 60, &came), RCGNS_MEMORY);
 }
 
 /* ---- refusing ----------------------------------------------------------------------------------------------------- */
@@ -425,7 +452,8 @@ RT_MAIN(RT_CASE(hexahedra_beyond_2_to_the_31_and_32_are_read), RT_CASE(blocks_be
         RT_CASE(polyhedra_with_offsets_and_numbers_beyond_2_to_the_32_are_read),
         RT_CASE(slices_beyond_2_to_the_32_are_written_and_read_again),
         RT_CASE(shares_of_billions_are_even_disjoint_and_complete), RT_CASE(ranges_of_boxes_of_billions_are_cut_without_gap),
-        RT_CASE(exchanges_beyond_one_call_of_mpi_are_refused_on_every_rank),
+        RT_CASE(exchanges_beyond_one_message_of_mpi_are_made_of_several),
+        RT_CASE(exchanges_beyond_all_memory_are_refused_on_every_rank),
         RT_CASE(offsets_that_pass_the_end_of_a_long_array_are_refused),
         RT_CASE(element_ranges_longer_than_their_array_are_refused), RT_CASE(sizes_whose_product_overflows_are_refused),
         RT_CASE(arrays_that_claim_more_than_the_file_holds_are_refused))

@@ -30,13 +30,59 @@ static void rows_of_any_length_arrive_in_order(void)
     for (int64_t i = 0; i < g; i++) word[offset[num + 1]++] = g;
     global[num++] = g;
   }
-  RT_EQ(rslice_ship(MPI_COMM_WORLD, RSLICE_OK, total, num, global, offset, word, &rows), RSLICE_OK);
-  RT_EQ(rows.first, rslice_begin(total, rt_rank(), rt_size()));
-  for (int64_t i = 0; i < rows.num; i++) {
-    RT_EQ(rows.offset[i + 1] - rows.offset[i], rows.first + i);
-    for (int64_t k = rows.offset[i]; k < rows.offset[i + 1]; k++) RT_EQ(rows.word[k], rows.first + i);
+  for (int64_t chunk = 1; chunk <= RSLICE_CHUNK; chunk *= 11) {
+    RT_EQ(rslice_ship_chunked(MPI_COMM_WORLD, RSLICE_OK, chunk, total, num, global, offset, word, &rows), RSLICE_OK);
+    RT_EQ(rows.first, rslice_begin(total, rt_rank(), rt_size()));
+    for (int64_t i = 0; i < rows.num; i++) {
+      RT_EQ(rows.offset[i + 1] - rows.offset[i], rows.first + i);
+      for (int64_t k = rows.offset[i]; k < rows.offset[i + 1]; k++) RT_EQ(rows.word[k], rows.first + i);
+    }
+    rslice_drop(&rows);
   }
-  rslice_drop(&rows);
+}
+
+/* Records of three bytes; rank a has (a + 2 b) % 5 * 7 of them for rank b. */
+static int64_t records(int a, int b) { return (a + 2 * b) % 5 * 7; }
+
+static void records_arrive_whatever_the_size_of_messages(void)
+{
+  char    send[64 * 35][3];
+  int64_t send_count[64], recv_count[64], num = 0;
+
+  for (int r = 0; r < rt_size(); r++) {
+    send_count[r] = records(rt_rank(), r);
+    for (int64_t i = 0; i < send_count[r]; i++, num++) {
+      send[num][0] = (char)rt_rank();
+      send[num][1] = (char)r;
+      send[num][2] = (char)i;
+    }
+  }
+  for (int64_t chunk = 1; chunk <= RSLICE_CHUNK; chunk = 3 * chunk + 1) {
+    void *recv = NULL;
+    char *at;
+
+    RT_EQ(rslice_exchange(MPI_COMM_WORLD, RSLICE_OK, chunk, sizeof *send, send_count, send, recv_count, &recv), RSLICE_OK);
+    at = recv;
+    for (int r = 0; r < rt_size(); r++) {
+      RT_EQ(recv_count[r], records(r, rt_rank()));
+      for (int64_t i = 0; i < recv_count[r]; i++, at += 3) RT_CHECK(at[0] == r && at[1] == rt_rank() && at[2] == i);
+    }
+    free(recv);
+  }
+}
+
+static void a_rank_in_trouble_stops_the_exchange_everywhere(void)
+{
+  int64_t send_count[64] = {0}, recv_count[64];
+  void   *recv = NULL;
+
+  for (int failing = 0; failing < rt_size(); failing++) {
+    const rslice_status mine = rt_rank() == failing ? RSLICE_INTERNAL : RSLICE_OK;
+
+    RT_EQ(rslice_exchange(MPI_COMM_WORLD, mine, RSLICE_CHUNK, 8, mine ? NULL : send_count, NULL, recv_count, &recv),
+          RSLICE_INTERNAL);
+    RT_CHECK(!recv);
+  }
 }
 
 static void a_row_that_nobody_has_is_an_error_on_all_ranks(void)
@@ -96,4 +142,5 @@ static void nodes_faces_and_cells_do_not_depend_on_who_has_them(void)
 }
 
 RT_MAIN(RT_CASE(slices_cover_all_rows_and_differ_by_one), RT_CASE(rows_of_any_length_arrive_in_order),
+        RT_CASE(records_arrive_whatever_the_size_of_messages), RT_CASE(a_rank_in_trouble_stops_the_exchange_everywhere),
         RT_CASE(a_row_that_nobody_has_is_an_error_on_all_ranks), RT_CASE(nodes_faces_and_cells_do_not_depend_on_who_has_them))
