@@ -6,6 +6,9 @@
  * area, or has. A body has faces in four planes at least; where fewer are left there is none. Where four or more are left,
  * the sum is taken exactly.
  *
+ * Points are told from each other by what they lie on, not by numbers: a vertex, a pair of edges that cross, or a triangle and
+ * the edge that crosses it. So where planes coincide, a polygon between two of them is seen to have shrunk to a line.
+ *
  * All of it holds for any cells, inverted and tangled ones too. O(sides log sides) where the sides cancel, which they do on
  * identical, nested and abutting meshes; exact sums cost as rational.c says. */
 #include <math.h>
@@ -71,23 +74,25 @@ int rm_moments_axis(const rm_trimesh *m, rm_lid t)
 
 /* ---- limits: where the crossings are without simulation of simplicity ---------------------------------------------------- */
 
-/* Where a crossing lies exactly: nowhere in particular, at end h of its edge, at corner h of its triangle. */
-enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2 };
+/* Where a crossing lies exactly: nowhere in particular, at end h of its edge, at corner h of its triangle, on side h of it. */
+enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2, AT_SIDE = AT_CORNER + 3 };
 
-/* AT_END + h if that end lies in the triangle's plane, AT_CORNER + h if that corner lies on the edge's line. */
+/* AT_END + h if that end lies in the triangle's plane, AT_CORNER + h if that corner lies on the edge's line, AT_SIDE + h if the
+ * edge's line meets the line of that side alone. */
 static int find_limit(const double *const p[2], const double *const v[3])
 {
-  bool on[2]; /* meets the line through corners h and h + 1 */
+  bool on[3]; /* meets the line through corners h and h + 1 */
 
   for (int h = 0; h < 2; h++)
     if (rm_orient3d(v[0], v[1], v[2], p[h]) == 0) return AT_END + h;
   for (int h = 0; h < 2; h++) on[h] = rm_orient3d(p[0], p[1], v[h], v[h + 1]) == 0;
   if (on[0] && on[1]) return AT_CORNER + 1;
-  if ((!on[0] && !on[1]) || rm_orient3d(p[0], p[1], v[2], v[0]) != 0) return AT_NOTHING;
-  return on[0] ? AT_CORNER : AT_CORNER + 2;
+  on[2] = rm_orient3d(p[0], p[1], v[2], v[0]) == 0;
+  if (on[2]) return on[0] ? AT_CORNER : on[1] ? AT_CORNER + 2 : AT_SIDE + 2;
+  return on[0] ? AT_SIDE : on[1] ? AT_SIDE + 1 : AT_NOTHING;
 }
 
-/* Give a locus its vertex, if it has one. A crossing is the end of many sides: its answer is kept. */
+/* Give a locus its vertex, if it has one, and its edges. A crossing is the end of many sides: its answer is kept. */
 static void settle_locus(const work *w, locus *l)
 {
   if (l->crossing < 0) return;
@@ -99,13 +104,28 @@ static void settle_locus(const work *w, locus *l)
   if (!*at)
     *at = (uint8_t)find_limit((const double *const[2]){own->vertex[e[0]], own->vertex[e[1]]},
                               (const double *const[3]){other->vertex[t[0]], other->vertex[t[1]], other->vertex[t[2]]});
-  if (*at != AT_NOTHING) l->vertex = *at < AT_CORNER ? own->vertex[e[*at - AT_END]] : other->vertex[t[*at - AT_CORNER]];
+  l->edge[l->mesh] = x->edge;
+  if (*at >= AT_SIDE) l->edge[1 - l->mesh] = other->triangle_edge[x->triangle / 2][*at - AT_SIDE];
+  else if (*at != AT_NOTHING) l->vertex = *at < AT_CORNER ? own->vertex[e[*at - AT_END]] : other->vertex[t[*at - AT_CORNER]];
 }
+
+/* A settled locus where two edges cross: both meshes may have it as a crossing, with one triangle or another. */
+static bool is_of_edges(const locus *l) { return !l->vertex && l->edge[0] >= 0 && l->edge[1] >= 0; }
 
 static bool is_same_locus(const locus *a, const locus *b)
 {
   if (a->vertex || b->vertex) return a->vertex && b->vertex && is_same(a->vertex, b->vertex);
+  if (is_of_edges(a) || is_of_edges(b)) return a->edge[0] == b->edge[0] && a->edge[1] == b->edge[1];
   return a->crossing == b->crossing && a->mesh == b->mesh;
+}
+
+/* True if the locus is known to lie on an edge's line. */
+static bool is_on_edge(const work *w, const locus *l, int mesh, rm_lid edge)
+{
+  const rm_trimesh *m = w->o->mesh[mesh];
+
+  return l->edge[mesh] == edge ||
+         (l->vertex && (is_same(l->vertex, m->vertex[m->edge[edge][0]]) || is_same(l->vertex, m->vertex[m->edge[edge][1]])));
 }
 
 void rm_moments_settle(work *w, polygon *g)
@@ -179,7 +199,7 @@ static polygon *find_polygon(work *w, slot *s, const plane *pl)
   return g;
 }
 
-static locus locus_of(const point *p) { return (locus){p->edge < 0 ? p->base : NULL, p->mesh, p->crossing}; }
+static locus locus_of(const point *p) { return (locus){p->edge < 0 ? p->base : NULL, p->mesh, p->crossing, {-1, -1}}; }
 
 /* The polygon's rounded area and its sides, for pairs that are in doubt, and for skins. */
 static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, const point *p, const point *q)
@@ -223,7 +243,9 @@ void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, doub
 
 static uint64_t locus_key(const locus *p)
 {
-  return p->vertex ? rm_hash_point(p->vertex) : rm_hash_word(2 * (uint64_t)p->crossing + (uint64_t)p->mesh);
+  if (p->vertex) return rm_hash_point(p->vertex);
+  return rm_hash_word(is_of_edges(p) ? (uint64_t)p->edge[0] << 32 | (uint64_t)p->edge[1]
+                                     : 2 * (uint64_t)p->crossing + (uint64_t)p->mesh);
 }
 
 /* +1: the same side, -1: the same but for its direction, 0: another one. */
@@ -286,24 +308,46 @@ static const double *corner_of(const work *w, const polygon *g)
   return m->vertex[m->triangle[g->triangle][0]];
 }
 
-/* A polygon may have area: its triangle has, and its sides do not run to and fro between two vertices. */
+/* End h of a side. */
+static const locus *end_of(const polygon_side *s, int h) { return h ? &s->to : &s->from; }
+
+/* True if the polygon's sides are known to lie on an edge of either mesh that passes through x. */
+static bool is_along_edge(const work *w, const polygon *g, const locus *x)
+{
+  for (int mesh = 0; mesh < 2; mesh++) {
+    bool all = x->edge[mesh] >= 0;
+
+    for (int k = g->first_side; k >= 0 && all; k = w->side[k].next)
+      all = is_on_edge(w, &w->side[k].from, mesh, x->edge[mesh]) && is_on_edge(w, &w->side[k].to, mesh, x->edge[mesh]);
+    if (all) return true;
+  }
+  return false;
+}
+
+/* A polygon may have area: its triangle has, and its sides do not run to and fro between two vertices or along an edge. */
 static bool may_have_area(work *w, polygon *g)
 {
   const double *one = NULL, *other = NULL;
+  bool          may = false;
 
   rm_moments_settle(w, g);
-  for (int k = g->first_side; k >= 0; k = w->side[k].next)
-    for (int h = 0; h < 2; h++) {
-      const double *v = h ? w->side[k].to.vertex : w->side[k].from.vertex;
-      if (!v) return rm_moments_axis(w->o->mesh[g->mesh], g->triangle) >= 0;
-      if (!one || is_same(v, one))
+  for (int k = g->first_side; k >= 0 && !may; k = w->side[k].next)
+    for (int h = 0; h < 2 && !may; h++) {
+      const locus  *x = end_of(&w->side[k], h);
+      const double *v = x->vertex;
+
+      if (!v) {
+        if (is_along_edge(w, g, x)) return false;
+        may = true;
+      } else if (!one || is_same(v, one)) {
         one = v;
-      else if (!other || is_same(v, other))
+      } else if (!other || is_same(v, other)) {
         other = v;
-      else
-        return rm_moments_axis(w->o->mesh[g->mesh], g->triangle) >= 0;
+      } else {
+        may = true;
+      }
     }
-  return false;
+  return may && rm_moments_axis(w->o->mesh[g->mesh], g->triangle) >= 0;
 }
 
 /* The polygons that may have area, plane by plane, into w->plane; their number, -1 if memory ran out. */

@@ -58,11 +58,13 @@ typedef struct plane {
   double        height;  /* foot = height n */
 } plane;
 
-/* Where simulation of simplicity leaves a point: in a vertex of one of the meshes, or where a crossing is. */
+/* Where simulation of simplicity leaves a point: in a vertex of one of the meshes, where an edge of one crosses an edge of the
+ * other, or where an edge crosses a triangle. The edges are known once the locus is settled; a vertex may lie on more. */
 typedef struct locus {
-  const double *vertex;   /* its coordinates if it is one, else NULL */
-  int           mesh;     /* of the edge                             */
-  int64_t       crossing; /* its place in the trace, -1 for a vertex */
+  const double *vertex;   /* its coordinates if it is one, else NULL                */
+  int           mesh;     /* of the edge                                            */
+  int64_t       crossing; /* its place in the trace, -1 for a vertex                */
+  rm_lid        edge[2];  /* [mesh] an edge on which it lies, -1 where none is known */
 } locus;
 
 /* A side of a polygon, going round it. */
