@@ -28,6 +28,7 @@ struct rm_carrier {
   const rm_nearest *nearest;            /* NULL: nobody takes any                                       */
   double           *value;              /* [receiving cells][num_fields] old values, then new ones      */
   double           *room;               /* [6][num_fields]                                              */
+  uint8_t          *is_plain;           /* [receiving cells] of rm_find_plain                           */
   rm_integral      *integral;           /* [num_fields]                                                 */
   double           *extreme;            /* [4][num_fields] least, least, greatest, greatest              */
   int64_t          *count;              /* [num_fields][NUM_COUNTS] for reports                         */
@@ -53,6 +54,7 @@ static remap_status make_packing(rm_arena *arena, const rm_load *load, rm_packin
   RM_NEW(p->degree, arena, load->num_fields);
   RM_NEW(p->system_of, arena, load->num_fields);
   RM_NEW(p->system, arena, load->num_systems);
+  RM_NEW(p->span, arena, load->num_fields);
   return REMAP_OK;
 }
 
@@ -86,6 +88,7 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   if (c->load.num_systems > 0) RM_NEW(c->number, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(c->value, arena, rm_mul_sat(setup->receiving->num_cells, n));
   RM_NEW(c->room, arena, 6 * (int64_t)n);
+  RM_NEW(c->is_plain, arena, setup->receiving->num_cells);
   RM_NEW(c->integral, arena, n);
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
   RM_NEW(c->count, arena, NUM_COUNTS * (int64_t)n);
@@ -96,7 +99,7 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
                                  .second  = setup->giving_second,
                                  .measure = setup->giving_measure,
                                  .differs = setup->giving_differs};
-  c->giving.given = c->given;
+  c->giving.given  = c->given;
   RM_TRY(rm_profile_init(arena, stream, &c->load, &c->giving));
   if (c->load.is_blended) RM_TRY(make_keeping(arena, c));
   if (c->load.is_settled) {
@@ -143,6 +146,7 @@ remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, r
   if (load.has_nearest)
     RM_TRY(rm_nearest_build(arena, comm, setup->receiving, setup->receiving_stencil, setup->rows->cover, &c->nearest, reason));
   RM_TRY(rm_comm_agree(comm, make_room(arena, c), NULL));
+  rm_find_plain(setup, c->is_plain);
   RM_TRY(rm_comm_agree(comm, make_parley(arena, c), NULL));
   *out = c;
   return REMAP_OK;
@@ -201,10 +205,8 @@ static remap_status gather(rm_carrier *c)
   const rm_transfer_setup *setup  = &c->setup;
   rm_reason               *reason = &c->word.reason;
 
-  for (int f = 0; f < c->packing.num_fields; f++) {
-    RM_TRY(rm_gather_given(setup, &c->packing, f, c->given, reason));
-    RM_TRY(rm_gather_old(setup, &c->packing, f, c->value, reason));
-  }
+  RM_TRY(rm_gather_given(setup, &c->packing, c->given, reason));
+  RM_TRY(rm_gather_old(setup, &c->packing, c->value, reason));
   rm_turn_vectors(setup, &c->packing, c->given);
   if (c->packing.num_systems > 0) {
     RM_TRY(rm_gather_numbers(setup->giving, setup->giving_rows, &c->packing, c->given, c->number, reason));
@@ -287,6 +289,7 @@ static void carry(rm_carrier *c, bool wants_integral)
                             .packing  = &c->packing,
                             .value    = c->value,
                             .room     = c->room,
+                            .is_plain = c->is_plain,
                             .keeping  = blends(c) ? &c->keeping : NULL,
                             .integral = wants_integral ? c->integral : NULL};
 
@@ -434,7 +437,7 @@ remap_status rm_carrier_finish(rm_carrier *c, double cubed, remap_field_report *
     reports[f].target_integral *= cubed;
   }
   if (status == REMAP_OK) {
-    for (int f = 0; f < num; f++) rm_write_values(&c->setup, &c->packing, f, c->value);
+    rm_write_values(&c->setup, &c->packing, c->value);
     return REMAP_OK;
   }
   *reason = c->word.reason;

@@ -5,7 +5,8 @@
  *   profile         reconstruction with its messages                 packing   what travels, and where it stands
  *   system          fields that are converted and moved together     admit     states that can be
  *   gather          between the caller's arrays and ours             nearest   where uncovered cells look
- *   receive         receiving cells, coverage policies               integral  what was kept, exactly
+ *   rows            sums over pairs                                  integral  what was kept, exactly
+ *   receive         receiving cells, coverage policies
  *   caas            clipping                                         carrier   all of it in order, in two steps  */
 #ifndef RM_FIELD_PRIVATE_H
 #define RM_FIELD_PRIVATE_H
@@ -63,6 +64,12 @@ typedef struct rm_system {
   int density, motion[3], energy;
 } rm_system;
 
+/* Fields next to each other that rows are summed for together: of one degree, all in one system or in none. */
+enum { RM_SPAN_FIELDS = 4 };
+typedef struct rm_span {
+  int first, num, degree; /* num <= RM_SPAN_FIELDS */
+} rm_span;
+
 typedef struct rm_packing {
   const remap_transfer   *how;
   const remap_field_desc *fields;
@@ -72,7 +79,10 @@ typedef struct rm_packing {
   int                    *degree;    /* [num_fields] 0, 1 or 2: of the polynomials that travel    */
   int                    *system_of; /* [num_fields] number in the list, -1: none                 */
   int                     num_systems;
-  rm_system              *system;     /* [num_systems]                                             */
+  rm_system              *system; /* [num_systems]                                             */
+  int                     num_spans;
+  rm_span                *span; /* [num_spans] all fields but flags, ascending               */
+  int                     num_flags;
   bool                    has_bounds; /* fields of order 2 or 3 carry the bounds                   */
   bool                    is_limited; /* Barth-Jespersen                                           */
   bool                    is_checked; /* but not in cells that are smooth                          */
@@ -177,9 +187,9 @@ typedef struct rm_ground {
   const rm_stencil *stencil;
   const rm_rows    *rows;    /* of its cells                                                               */
   const double (*second)[6]; /* rm_mesh_second; NULL unless systems have slopes                            */
-  const double *measure;     /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
+  const double  *measure;    /* [cells] the solver's volumes over those of the mesh; NULL: 1               */
   const uint8_t *differs;    /* [cells] as in rm_transfer_setup                                            */
-  bool          is_keeping;  /* polynomials are asked for in partial cells only, not in all that are mapped */
+  bool           is_keeping; /* polynomials are asked for in partial cells only, not in all that are mapped */
 } rm_ground;
 
 typedef struct rm_profile rm_profile;
@@ -380,25 +390,30 @@ remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setu
 
 /* ---- gather ---------------------------------------------------------------------------------------------------- */
 
-/* Values of field f in the giving cells, [giving cells][num_fields]. Those that nobody may have count as 0, whatever stands
+/* Values of all fields in the giving cells, [giving cells][num_fields]. Those that nobody may have count as 0, whatever stands
  * there. BAD_VALUE. */
-remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given,
-                             rm_reason *reason);
-/* Old values, where they are used, [receiving cells][num_fields]. BAD_VALUE. */
-remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason);
+remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, double *given, rm_reason *reason);
+/* Old values, where they are used, [receiving cells][num_fields]; others stay as they are. BAD_VALUE. */
+remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, double *value, rm_reason *reason);
 /* Old values of systems, where they are mixed with new ones, to amounts per volume; room is [num_fields]. BAD_VALUE. */
 remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing *packing, double *value, double *room,
                                rm_reason *reason);
 /* Old values of all fields that are blended, and what is reconstructed of them; NaN where there is no such number. Both are
  * [receiving cells][num_fields], one array if there are no systems. */
 void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, double *given, double *number);
-/* Into the caller's array. */
-void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, int f, const double *value);
+/* Into the caller's arrays. */
+void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, const double *value);
 /* Turn vectors into the frame of those who receive. */
 void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, double *given);
 /* What is reconstructed, from what is given; they may be the same array. BAD_VALUE if a density is not positive. */
 remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
                                double *number, rm_reason *reason);
+
+/* ---- rows ------------------------------------------------------------------------------------------------------ */
+
+/* What a receiving cell gets, scaled: content [num_fields] of u V + g.M + h:S over its row, but for flags. got as in
+ * rm_receipt. Not collective. O(pairs of the row) per field. */
+void rm_sum_row(const rm_packing *packing, const rm_rows *rows, const double *got, rm_lid cell, double *content);
 
 /* ---- receive --------------------------------------------------------------------------------------------------- */
 
@@ -411,6 +426,7 @@ struct rm_receipt {
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
   double                  *room;     /* [6][num_fields]                                           */
+  const uint8_t           *is_plain; /* [receiving cells] of rm_find_plain                        */
   const rm_profile        *keeping;  /* of old content; NULL: nobody blends, or there are no slopes */
   rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */
 };
@@ -419,6 +435,9 @@ struct rm_receipt {
 bool rm_keeps_old(const remap_transfer *how, const remap_field_desc *field, uint8_t cover);
 /* Do uncovered cells take the nearest value of this field? */
 bool rm_needs_nearest(const remap_transfer *how, const remap_field_desc *field);
+/* Which receiving cells simply divide what they get by their volume: is_plain [receiving cells] receives 1 for those that are
+ * covered by more than their like alone, and have volume. */
+void rm_find_plain(const rm_transfer_setup *setup, uint8_t *is_plain);
 /* The new value of every cell that wants one, but for those that take the nearest. Not collective. O(pairs) per field. */
 void rm_receive(const rm_receipt *receipt);
 

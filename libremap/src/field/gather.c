@@ -1,35 +1,44 @@
 /* gather -- values between the caller's arrays, strided and block by block, and those of a transfer, cell after cell; vectors
- * are turned and systems converted on the way. O(cells) per field. */
+ * are turned and systems converted on the way. All fields of a few cells are moved before those of the next: ours stay in the
+ * cache meanwhile. O(cells) per field. */
 #include "field_private.h"
 
+#include <float.h>
 #include <stdio.h>
 
-/* The values of one block of one field: of cells first to end - 1, that of cell i at array + stride * (place[i] or i - zero).
- */
+/* Cells next to each other, at most FEW, of one block. */
 typedef struct strip {
   const rm_layout *layout;
-  rm_lid           first, end, zero;
-  int64_t          stride;
+  int              block;
+  rm_lid           first, end;
 } strip;
+enum { FEW = 256 };
 
-static int num_strips(const rm_layout *layout) { return layout->num_blocks > 0 ? layout->num_blocks : 1; }
-
-static strip strip_of(const rm_layout *layout, rm_lid num_cells, int block, bool is_by_block, int64_t stride)
+/* The strip after s, the first one after {.layout = layout}; false if there is none. */
+static bool next_strip(strip *s, rm_lid num_cells)
 {
-  strip s = {layout, 0, num_cells, 0, stride ? stride : 1};
+  const int num_blocks = s->layout->num_blocks;
+  rm_lid    block_end  = num_blocks > 0 ? s->layout->block_offset[s->block + 1] : num_cells;
 
-  if (layout->num_blocks > 0) {
-    s.first = layout->block_offset[block];
-    s.end   = layout->block_offset[block + 1];
-  }
-  if (is_by_block) s.zero = s.first;
-  return s;
+  while (s->end == block_end && s->block + 1 < num_blocks) block_end = s->layout->block_offset[++s->block + 1];
+  s->first = s->end;
+  s->end   = block_end - s->first > FEW ? s->first + FEW : block_end;
+  return s->first < s->end;
 }
 
-static int64_t place_of(const strip *s, rm_lid cell)
+/* Where a field's values stand in its array, which is one per block or one for all. */
+typedef struct spots {
+  const int64_t *place; /* [cells], NULL: cell i at place i - zero */
+  rm_lid         zero;
+  int64_t        stride;
+} spots;
+
+static spots spots_of(const strip *s, bool is_by_block, int64_t stride)
 {
-  return (s->layout->place ? s->layout->place[cell] : cell - s->zero) * s->stride;
+  return (spots){s->layout->place, is_by_block && s->layout->num_blocks > 0 ? s->layout->block_offset[s->block] : 0,
+                 stride ? stride : 1};
 }
+static inline int64_t spot_of(spots s, rm_lid cell) { return (s.place ? s.place[cell] : cell - s.zero) * s.stride; }
 
 /* A field's name for messages. */
 typedef struct label {
@@ -54,23 +63,42 @@ static remap_status bad_value(const rm_packing *packing, int f, const rm_mesh *m
                  label_of(packing, f).text, which, value);
 }
 
-remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *given, rm_reason *reason)
+/* In line, unlike isfinite. */
+static inline bool is_finite(double x) { return fabs(x) <= DBL_MAX; }
+
+/* What is wrong among these values of field f in the cells of a strip, the first of them at x; num_fields from one cell's to
+ * the next one's. */
+static remap_status bad_values(const rm_packing *packing, int f, const rm_mesh *mesh, const strip *s, const double *x,
+                               const char *which, rm_reason *reason)
 {
-  const rm_mesh          *mesh   = setup->giving;
-  const remap_field_desc *field  = &packing->fields[f];
-  const rm_layout        *layout = &setup->giving_layout;
+  rm_lid i = s->first;
 
-  for (int b = 0; b < num_strips(layout); b++) {
-    const strip   s  = strip_of(layout, mesh->num_cells, b, field->in_block != NULL, field->in_stride);
-    const double *in = field->in_block ? field->in_block[b] : field->in;
+  while (is_finite(x[(int64_t)(i - s->first) * packing->num_fields])) i++;
+  return bad_value(packing, f, mesh, i, x[(int64_t)(i - s->first) * packing->num_fields], which, reason);
+}
 
-    for (rm_lid i = s.first; i < s.end; i++) {
-      const double value = setup->giving_rows->cover[i] != REMAP_UNWANTED ? in[place_of(&s, i)] : 0.0;
+remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *packing, double *given, rm_reason *reason)
+{
+  const rm_mesh *mesh  = setup->giving;
+  const uint8_t *cover = setup->giving_rows->cover;
+  const int      num   = packing->num_fields;
 
-      if (!isfinite(value) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, value, "the", reason);
-      given[(int64_t)i * packing->num_fields + f] = value;
+  for (strip s = {.layout = &setup->giving_layout}; next_strip(&s, mesh->num_cells);)
+    for (int f = 0; f < num; f++) {
+      const remap_field_desc *field = &packing->fields[f];
+      const spots             place = spots_of(&s, field->in_block != NULL, field->in_stride);
+      const double           *in    = field->in_block ? field->in_block[s.block] : field->in;
+      double                 *to = given + (int64_t)s.first * num + f, *at = to;
+      bool                    is_good = true;
+
+      for (rm_lid i = s.first; i < s.end; i++, at += num) {
+        const double value = cover[i] != REMAP_UNWANTED ? in[spot_of(place, i)] : 0.0;
+
+        *at = value;
+        is_good &= is_finite(value);
+      }
+      if (!is_good && !packing->how->allow_nan) return bad_values(packing, f, mesh, &s, to, "the", reason);
     }
-  }
   return REMAP_OK;
 }
 
@@ -80,38 +108,42 @@ static double *out_of(const remap_field_desc *field, int block)
   return field->out_block ? field->out_block[block] : field->out;
 }
 
-remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, int f, double *value, rm_reason *reason)
+remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *packing, double *value, rm_reason *reason)
 {
-  const rm_mesh          *mesh   = setup->receiving;
-  const remap_field_desc *field  = &packing->fields[f];
-  const rm_layout        *layout = &setup->receiving_layout;
+  const rm_mesh *mesh  = setup->receiving;
+  const uint8_t *cover = setup->rows->cover;
 
-  for (int b = 0; b < num_strips(layout); b++) {
-    const strip   s   = strip_of(layout, mesh->num_cells, b, field->out_block != NULL, field->out_stride);
-    const double *out = out_of(field, b);
+  for (strip s = {.layout = &setup->receiving_layout}; next_strip(&s, mesh->num_cells);)
+    for (int f = 0; f < packing->num_fields; f++) {
+      const remap_field_desc *field = &packing->fields[f];
+      const spots             place = spots_of(&s, field->out_block != NULL, field->out_stride);
+      const double           *out   = out_of(field, s.block);
 
-    for (rm_lid i = s.first; i < s.end; i++) {
-      const double old = rm_keeps_old(packing->how, field, setup->rows->cover[i]) ? out[place_of(&s, i)] : 0.0;
+      for (rm_lid i = s.first; i < s.end && field->has_old; i++) {
+        if (cover[i] == REMAP_COVERED || !rm_keeps_old(packing->how, field, cover[i])) continue;
+        const double old = out[spot_of(place, i)];
 
-      if (!isfinite(old) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, old, "the old", reason);
-      value[(int64_t)i * packing->num_fields + f] = old;
+        if (!is_finite(old) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, old, "the old", reason);
+        value[(int64_t)i * packing->num_fields + f] = old;
+      }
     }
-  }
   return REMAP_OK;
 }
 
-void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, int f, const double *value)
+void rm_write_values(const rm_transfer_setup *setup, const rm_packing *packing, const double *value)
 {
-  const remap_field_desc *field  = &packing->fields[f];
-  const rm_layout        *layout = &setup->receiving_layout;
+  const uint8_t *cover = setup->rows->cover;
+  const int      num   = packing->num_fields;
 
-  for (int b = 0; b < num_strips(layout); b++) {
-    const strip s   = strip_of(layout, setup->receiving->num_cells, b, field->out_block != NULL, field->out_stride);
-    double     *out = out_of(field, b);
+  for (strip s = {.layout = &setup->receiving_layout}; next_strip(&s, setup->receiving->num_cells);)
+    for (int f = 0; f < num; f++) {
+      const remap_field_desc *field = &packing->fields[f];
+      const spots             place = spots_of(&s, field->out_block != NULL, field->out_stride);
+      double                 *out   = out_of(field, s.block);
 
-    for (rm_lid i = s.first; i < s.end; i++)
-      if (setup->rows->cover[i] != REMAP_UNWANTED) out[place_of(&s, i)] = value[(int64_t)i * packing->num_fields + f];
-  }
+      for (rm_lid i = s.first; i < s.end; i++)
+        if (cover[i] != REMAP_UNWANTED) out[spot_of(place, i)] = value[(int64_t)i * num + f];
+    }
 }
 
 /* Turn the vector with these components in all cells; backward the other way. */
@@ -195,22 +227,20 @@ remap_status rm_gather_amounts(const rm_transfer_setup *setup, const rm_packing 
 
 void rm_gather_kept(const rm_transfer_setup *setup, const rm_packing *packing, double *given, double *number)
 {
-  const rm_mesh   *mesh   = setup->receiving;
-  const rm_layout *layout = &setup->receiving_layout;
-  const int        num    = packing->num_fields;
+  const rm_mesh *mesh  = setup->receiving;
+  const uint8_t *cover = setup->rows->cover;
+  const int      num   = packing->num_fields;
 
-  for (int f = 0; f < num; f++) {
-    const remap_field_desc *field   = &packing->fields[f];
-    const bool              is_read = rm_is_blended(setup, packing->how, field);
-
-    for (int b = 0; b < num_strips(layout); b++) {
-      const strip   s   = strip_of(layout, mesh->num_cells, b, field->out_block != NULL, field->out_stride);
-      const double *out = out_of(field, b);
+  for (strip s = {.layout = &setup->receiving_layout}; next_strip(&s, mesh->num_cells);)
+    for (int f = 0; f < num; f++) {
+      const remap_field_desc *field   = &packing->fields[f];
+      const bool              is_read = rm_is_blended(setup, packing->how, field);
+      const spots             place   = spots_of(&s, field->out_block != NULL, field->out_stride);
+      const double           *out     = out_of(field, s.block);
 
       for (rm_lid i = s.first; i < s.end; i++)
-        given[(int64_t)i * num + f] = is_read && setup->rows->cover[i] != REMAP_UNWANTED ? out[place_of(&s, i)] : 0.0;
+        given[(int64_t)i * num + f] = is_read && cover[i] != REMAP_UNWANTED ? out[spot_of(place, i)] : 0.0;
     }
-  }
   for (rm_lid c = 0; c < mesh->num_cells && packing->num_systems > 0; c++) {
     int bad;
 

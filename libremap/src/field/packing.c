@@ -71,6 +71,27 @@ bool rm_load_covers(rm_load a, rm_load b)
          a.is_blended >= b.is_blended && a.has_nearest >= b.has_nearest;
 }
 
+/* Do two fields next to each other belong in one span? */
+static bool are_alike(const rm_packing *p, int f, int g)
+{
+  return p->degree[f] == p->degree[g] && p->system_of[f] == p->system_of[g];
+}
+
+static void find_spans(rm_packing *p)
+{
+  p->num_spans = p->num_flags = 0;
+  for (int f = 0; f < p->num_fields; f++) {
+    rm_span *last = p->num_spans > 0 ? &p->span[p->num_spans - 1] : NULL;
+
+    p->num_flags += p->fields[f].nature == REMAP_FLAG;
+    if (p->fields[f].nature == REMAP_FLAG) continue;
+    if (last && last->first + last->num == f && last->num < RM_SPAN_FIELDS && are_alike(p, last->first, f))
+      last->num++;
+    else
+      p->span[p->num_spans++] = (rm_span){f, 1, p->degree[f]};
+  }
+}
+
 void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
                      const remap_field_desc *fields)
 {
@@ -88,4 +109,5 @@ void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_
     p->width += rm_pack_width(p->degree[f], p->has_bounds);
   }
   rm_systems_find(p);
+  find_spans(p);
 }

@@ -21,7 +21,7 @@ bool rm_needs_nearest(const remap_transfer *how, const remap_field_desc *field)
   return true;
 }
 
-/* A row, for one field: sums in row order, the first two with compensation. */
+/* A row, for one field. */
 typedef struct row_sums {
   double content;   /* of u V + g.M + h:S */
   double volume;    /* of V         */
@@ -44,7 +44,7 @@ static giver_view view(const rm_receipt *w, int f, rm_lid giver)
                       w->packing->degree[f] > 1 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
 }
 
-/* What all fields share: no content. */
+/* What all fields share. Volumes are summed in row order, with compensation. */
 static row_sums measure_row(const rm_rows *rows, rm_lid cell)
 {
   rm_compensated volume    = {0.0, 0.0};
@@ -57,26 +57,8 @@ static row_sums measure_row(const rm_rows *rows, rm_lid cell)
   return (row_sums){0.0, rm_compensated_value(&volume), magnitude};
 }
 
-/* row: as measured. */
-static row_sums sum_row(const rm_receipt *w, int f, rm_lid cell, const row_sums *row)
-{
-  const rm_rows *rows    = w->setup->rows;
-  const int      degree  = w->packing->degree[f];
-  rm_compensated content = {0.0, 0.0};
-
-  for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const giver_view g = view(w, f, rows->giver[k]);
-
-    rm_compensated_add(&content, g.value * rows->volume[k]);
-    if (degree > 0) {
-      const double *m = rows->moment[k];
-
-      rm_compensated_add(&content, g.slope[0] * m[0] + g.slope[1] * m[1] + g.slope[2] * m[2]);
-    }
-    if (degree > 1) rm_compensated_add(&content, rm_dot6(g.curvature, rows->second[k]) + g.curvature[6] * rows->volume[k]);
-  }
-  return (row_sums){rm_compensated_value(&content), row->volume, row->magnitude};
-}
+/* Where the contents of a cell's row are, [num_fields]. */
+static double *content_of(const rm_receipt *w) { return w->room + 5 * w->packing->num_fields; }
 
 static bool is_copied(const rm_receipt *w, int f, rm_lid cell)
 {
@@ -87,6 +69,12 @@ static bool is_copied(const rm_receipt *w, int f, rm_lid cell)
 static double measure_of(const rm_receipt *w, int f, rm_lid cell)
 {
   return w->setup->receiving_measure && rm_is_amount(w->packing, f) ? w->setup->receiving_measure[cell] : 1.0;
+}
+
+/* row: as measured; contents of the cell's row have been summed. */
+static row_sums sums_of(const rm_receipt *w, int f, const row_sums *row)
+{
+  return (row_sums){content_of(w)[f], row->volume, row->magnitude};
 }
 
 /* True if a volume is what cancellation left of the parts it is made of: nothing may be divided by it. */
@@ -142,6 +130,7 @@ static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums
   double         least = INFINITY, greatest = -INFINITY, mean;
 
   if (is_void_row(w, cell, s)) return plain_mean(w, f, cell, s);
+  if (w->packing->degree[f] == 0) return s->content / s->volume;
   mean = mean_taken_beyond(w, f, cell, s);
   if (!w->packing->has_bounds || w->packing->order[f] < 2) return mean;
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
@@ -248,7 +237,7 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, const row_sums *r
 
   if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
   if (!is_copied(w, f, cell)) {
-    s = sum_row(w, f, cell, row);
+    s = sums_of(w, f, row);
     if (!is_normalised(w, f, cell)) {
       const double kept = is_blend(w, f, cell) ? kept_content(w, f, cell, old, &s) : 0.0;
 
@@ -281,7 +270,7 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, const
 
     mean[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s       = sum_row(w, f, cell, row);
+    s       = sums_of(w, f, row);
     mean[f] = is_void_row(w, cell, &s) ? plain_mean(w, f, cell, &s) : s.content / s.volume;
     if (p->degree[f] > 0 && !is_void_row(w, cell, &s)) change[f] = mean_taken_beyond(w, f, cell, &s) - mean[f];
     if (w->integral) rm_integral_add(&w->integral[f].minus_target, -1.0, s.content);
@@ -304,7 +293,7 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const row_
 
     kept[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s = sum_row(w, f, cell, row);
+    s = sums_of(w, f, row);
     add_kept(w, f, cell, old[f], &s, &kept[f], &change[f]);
     volume = w->setup->receiving->cell_volume[cell] - s.volume;
   }
@@ -340,7 +329,7 @@ static void receive_system(const rm_receipt *w, int system, rm_lid cell, const r
       value[f] = given[p->at[f]];
       continue;
     }
-    s        = sum_row(w, f, cell, row);
+    s        = sums_of(w, f, row);
     value[f] = receive_content(w, f, cell, value[f], kept[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
   }
 }
@@ -359,28 +348,78 @@ static void integrate_copies(const rm_receipt *w, rm_lid cell, const double *val
                       w->setup->receiving->cell_volume[cell]);
 }
 
+void rm_find_plain(const rm_transfer_setup *setup, uint8_t *is_plain)
+{
+  const rm_rows *rows = setup->rows;
+
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    is_plain[c] = 0;
+    if (rows->cover[c] != REMAP_COVERED || rows->same[rows->offset[c]]) continue;
+    const row_sums row = measure_row(rows, c);
+    is_plain[c]        = !is_void(setup->receiving->cell_volume[c], &row);
+  }
+}
+
+/* The new values of a plain cell, but for flags and systems. */
+static void receive_plain(const rm_receipt *w, rm_lid cell, double *value)
+{
+  const rm_packing *p       = w->packing;
+  const double     *content = content_of(w), volume = w->setup->receiving->cell_volume[cell];
+
+  for (int i = 0; i < p->num_spans; i++) {
+    const int first = p->span[i].first, end = first + p->span[i].num;
+
+    if (p->system_of[first] >= 0) continue;
+    if (w->setup->receiving_measure)
+      for (int f = first; f < end; f++) value[f] = content[f] / (volume * measure_of(w, f, cell)) / RM_VALUE_SCALE;
+    else
+      for (int f = first; f < end; f++) value[f] = content[f] / volume / RM_VALUE_SCALE;
+    for (int f = first; f < end && w->integral; f++)
+      rm_integral_add(&w->integral[f].minus_target, -(RM_VALUE_SCALE * value[f]) * measure_of(w, f, cell), volume);
+  }
+  for (int f = 0; f < p->num_fields && p->num_flags > 0; f++)
+    if (w->fields[f].nature == REMAP_FLAG) value[f] = receive_flag(w, f, cell);
+}
+
+/* The new values of an uncovered cell, but for those that it takes from the nearest. */
+static void receive_nothing(const rm_receipt *w, double *value)
+{
+  for (int f = 0; f < w->packing->num_fields; f++)
+    if (!rm_keeps_old(w->how, &w->fields[f], REMAP_UNCOVERED)) value[f] = w->how->fill_value;
+}
+
+/* The new values of a mapped cell. */
+static void receive_all(const rm_receipt *w, rm_lid cell, double *value)
+{
+  const rm_rows    *rows = w->setup->rows;
+  const rm_packing *p    = w->packing;
+  row_sums          row  = {0.0, 0.0, 0.0};
+
+  if (!w->is_plain[cell] || p->num_systems > 0) row = measure_row(rows, cell);
+  rm_sum_row(p, rows, w->got, cell, content_of(w));
+  if (w->is_plain[cell])
+    receive_plain(w, cell, value);
+  else
+    for (int f = 0; f < p->num_fields; f++)
+      if (p->system_of[f] < 0) value[f] = receive(w, f, cell, &row, value[f]);
+  for (int s = 0; s < p->num_systems; s++) receive_system(w, s, cell, &row, value);
+  if (p->num_systems == 0) return;
+  if (rm_is_copied(rows, w->setup->receiving_differs, cell, true))
+    integrate_copies(w, cell, value);
+  else
+    rm_system_restore(p, value);
+}
+
 void rm_receive(const rm_receipt *w)
 {
   const rm_rows *rows = w->setup->rows;
-  const int      num  = w->packing->num_fields;
 
   for (rm_lid c = 0; c < rows->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
-    const row_sums row   = measure_row(rows, c);
-    double        *value = w->value + (int64_t)c * num;
+    double *value = w->value + (int64_t)c * w->packing->num_fields;
 
-    if (rows->cover[c] == REMAP_UNWANTED) continue;
-    for (int f = 0; f < num; f++) {
-      if (rows->cover[c] == REMAP_UNCOVERED)
-        value[f] = rm_keeps_old(w->how, &w->fields[f], REMAP_UNCOVERED) ? value[f] : w->how->fill_value;
-      else if (w->packing->system_of[f] < 0)
-        value[f] = receive(w, f, c, &row, value[f]);
-    }
-    if (rows->cover[c] == REMAP_UNCOVERED) continue;
-    for (int s = 0; s < w->packing->num_systems; s++) receive_system(w, s, c, &row, value);
-    if (w->packing->num_systems == 0) continue;
-    if (rm_is_copied(rows, w->setup->receiving_differs, c, true))
-      integrate_copies(w, c, value);
-    else
-      rm_system_restore(w->packing, value);
+    if (rows->cover[c] == REMAP_UNCOVERED)
+      receive_nothing(w, value);
+    else if (rows->cover[c] != REMAP_UNWANTED)
+      receive_all(w, c, value);
   }
 }
