@@ -29,6 +29,8 @@ cli_exit cli_from_remap(const cli_job *j, remap_status status, cli_failure *why)
     return cli_fail(why, code, "%s: repair it, or let nothing move with it by --nature Density=volume-mean", text);
   if (status == REMAP_COVERAGE)
     return cli_fail(why, code, "%s: allow it by --on-uncovered, --on-partial or --min-coverage", text);
+  if (status == REMAP_ZONE_OVERLAP)
+    return cli_fail(why, code, "%s, or say by --priority, or by --source-mask and --target-mask, which cells count", text);
   if (strstr(text, path[REMAP_SOURCE]) || strstr(text, path[REMAP_TARGET])) return cli_fail(why, code, "%s", text);
   return cli_fail(why, code, "%s onto %s: %s", path[REMAP_SOURCE], path[REMAP_TARGET], text);
 }

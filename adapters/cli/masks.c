@@ -168,9 +168,11 @@ static cli_exit check_overlap(cli_job *j, cli_failure *why)
     mine = cli_fail(
         why, CLI_GEOMETRY,
         "%s: zones overlap where cells give values: cell %lld (counted from 1) of zone %s of %s is covered %.7g times: "
-        "give a --source-mask of fewer cells, or --priority",
+        "%s",
         j->options.path[REMAP_SOURCE], (long long)(mesh->cell_global[cell] - zone->first_cell + 1), zone->name, info->path,
-        fraction[cell]);
+        fraction[cell],
+        j->options.priority ? "name the zones that overlap one by one in --priority, the highest first"
+                            : "give a --source-mask of fewer cells, or --priority");
   }
   return cli_agree(j, mine, why);
 }

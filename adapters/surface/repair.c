@@ -74,6 +74,16 @@ static bool is_plain(const double *xyz, const int64_t *loop, int64_t n, int axis
   return true;
 }
 
+/* All corners lie on one line, or in one point. */
+static bool is_line(const double *xyz, const int64_t *loop, int64_t n)
+{
+  for (int64_t i = 1; i < n; i++)
+    for (int64_t k = i + 1; k < n; k++)
+      for (int axis = 0; axis < 3; axis++)
+        if (rs_turn(xyz + 3 * loop[0], xyz + 3 * loop[i], xyz + 3 * loop[k], axis)) return false;
+  return true;
+}
+
 /* No corner of the loop lies in the triangle a, b, c of three that follow each other, seen across the axis. */
 static bool is_ear(const double *xyz, const int64_t *loop, int64_t n, const int64_t ear[3], int axis, int turn)
 {
@@ -186,6 +196,8 @@ static rsurf_status clean_face(const rsurf_surface *s, const double *xyz, const 
   axis = main_axis(xyz, loop, m, &turn);
   if (m == 3 || is_plain(xyz, loop, m, axis, turn))
     return add_face(to, loop, m, s->face_group[f]) ? RSURF_OK : rs_no_memory(message);
+  if (is_line(xyz, loop, m))
+    return refuse_face(s, name, f, "has no area: beside the size of the surface its corners lie on one line", message);
   {
     const int64_t first = to->loop.count;
 

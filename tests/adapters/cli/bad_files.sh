@@ -24,7 +24,8 @@ refused 3 "units" "a mesh too small to have volumes beside the other is refused"
   good.cgns mesh.cgns --scale 1e-40 -o out/result.cgns
 refused 6 "open_cell.cgns.*Zone.*cell 1" "an open cell is refused" good.cgns open_cell.cgns -o out/result.cgns
 refused 6 "three_cells.cgns.*Zone.*face 1" "a face of three cells is refused" good.cgns three_cells.cgns -o out/result.cgns
-refused 6 "zones_overlap.cgns.*Zone.*Second" "zones that overlap are named" good.cgns zones_overlap.cgns -o out/result.cgns
+refused 6 "zones_overlap.cgns.*Zone.*Second.*priority.*mask" "zones that overlap are named, and what to do" \
+  good.cgns zones_overlap.cgns -o out/result.cgns
 refused 5 "short_field.cgns.*Zone.*Density" "a field of the wrong size is refused" short_field.cgns mesh.cgns -o out/result.cgns
 refused 5 "nan_field.cgns.*Zone.*cell 3.*MomentumX" "a value that is NaN is refused" nan_field.cgns mesh.cgns -o out/result.cgns
 refused 5 "at_vertices.cgns.*Vertex.*Density" "fields at vertices are refused by name" \

@@ -66,7 +66,8 @@ quick() {
 }
 quick 2 "crossed.cgns.*zone 'Base/Third'" "a zone that is nowhere is named" \
   crossed.cgns inside.cgns -o out/result.cgns --priority Base/Zone,Base/Third
-quick 6 "crossed.cgns" "zones of one class may not overlap" crossed.cgns inside.cgns -o out/result.cgns --priority 'Base/*'
+quick 6 "crossed.cgns.*one by one in --priority" "zones of one class may not overlap" \
+  crossed.cgns inside.cgns -o out/result.cgns --priority 'Base/*'
 quick 2 "source-coverage" "psi of pieces is not offered" \
   crossed.cgns inside.cgns -o out/result.cgns --priority Base/Zone --source-coverage psi.cgns
 quick 2 "supermesh" "nor a supermesh of them" \

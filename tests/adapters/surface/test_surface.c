@@ -456,6 +456,8 @@ static void shells_and_faces_without_size_are_refused(void)
       "(0 0 0)(1 0 0)(2 0 0) has no area"); /* the neighbour is no triangle */
   refused("v 0 0 0\nv 1 0 0\nv 0 0 0\nf 1 2 3\n", "points or lines");
   refused("v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n", "crosses itself");
+  refused("v 0 0 0\nv 1 0 0\nv 1 0 5e-324\nv 0 0 5e-324\nf 1 2 3 4\n", "has no area"); /* too thin for doubles */
+  refused("v 0 0 0\nv 1 2 3\nv 2 4 6\nv 3 6 9\nf 1 2 3 4\n", "has no area");
   refused("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4 5 3\n", "corner twice");
 }
 
