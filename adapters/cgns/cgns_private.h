@@ -6,7 +6,8 @@
  *   h5_tree.c    HDF5 files: tree and slabs       (with h5_write.c the only files that include hdf5.h)
  *   h5_write.c   HDF5 output from a plan
  *   file.c       rcgns_open, rcgns_close, reading of slabs from either kind of file
- *   sids_zone.c  zones and element sections: what is a volume cell, and where its row lies
+ *   sids_zone.c  zones and element sections: what is a volume cell
+ *   sids_rows.c  rows of sections that have no index
  *   sids_mesh.c  this rank's part of the mesh
  *   sids_dual.c  the cells about its vertices instead
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
@@ -221,12 +222,19 @@ typedef struct rc_section {
   int64_t   num_rows, length;      /* rows, and values of ElementConnectivity */
   int64_t   row_lo, row_hi;        /* rows that are no rind */
   int64_t   num_cells, first_cell; /* volume cells; number of the first in its zone */
-  int64_t   num_cuts;              /* MIXED, INLINE: one cut for each RC_CUT rows and one at the end */
-  int64_t  *cut_at;                /* [num_cuts] where that row begins */
-  int64_t  *cut_cell;              /* [num_cuts] volume cells before it */
+  rc_array  cut;                   /* MIXED, INLINE: rc_cut, every RC_CUT-th row of those that this rank passed, ascending */
 } rc_section;
 
 enum { RC_CUT = 1024 };
+
+/* A row whose number is a multiple of RC_CUT. */
+typedef struct rc_cut {
+  int64_t row, at; /* number; where it begins in ElementConnectivity */
+  int64_t cell;    /* volume cells of the section before it */
+} rc_cut;
+
+/* More than any file holds; sums of such counts do not overflow. */
+#define RC_TOO_MANY (INT64_C(1) << 50)
 
 typedef struct rc_zone {
   int64_t     node, base; /* in the tree */
@@ -309,6 +317,17 @@ int rc_element(double version, int64_t code, rc_shape *shape);
 int rc_surface_corners(double version, int64_t code);
 /* Corners of a shape. */
 int rc_corners(rc_shape shape);
+/* Nodes of a row of MIXED that begins with that code: of an element, or of a polygon, as old files may have them; 0: unknown. */
+int64_t rc_mixed_nodes(double version, int64_t code, rc_shape *shape);
+/* Corners of a surface that such a row is and a volume element may have, 0: it is none. */
+int rc_mixed_surface_corners(double version, int64_t code);
+/* Find the rows of a section that is MIXED or INLINE, count its volume cells; *curved: it has some of higher order.
+ * Collective. */
+rcgns_status rc_rows_scan(rcgns_file *file, const rc_zone *zone, rc_section *section, bool *curved, rcgns_message *message);
+/* The last cuts of such a section, on whatever rank, whose row or cell is no greater than key[num], which ascend. Collective,
+ * mine as in rc_read. */
+rcgns_status rc_cuts_find(rcgns_file *file, rcgns_status mine, const rc_section *section, bool by_cell, int num,
+                          const int64_t *key, rc_cut *found, rcgns_message *message);
 /* Rows [lo, hi) of a section that is not FIXED: offset [hi - lo + 1] and data, the type word of MIXED included, the count of
  * INLINE not. Collective. */
 rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,

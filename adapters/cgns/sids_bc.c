@@ -194,7 +194,7 @@ static rcgns_status number_mixed(bc_zone *z, const rc_section *s, rcgns_message 
     status = rc_rows_read(z->file, z->zone, s, lo, hi, &offset, &data, message);
     for (int64_t i = 0; i < hi - lo && status == RCGNS_OK && ok; i++) {
       const int64_t *row     = (const int64_t *)data.item + ((const int64_t *)offset.item)[i];
-      const int      corners = rc_surface_corners(z->file->version, row[0]);
+      const int      corners = rc_mixed_surface_corners(z->file->version, row[0]);
 
       if (corners) ok = number_face(z, row + 1, corners, s->first + lo + i);
     }

@@ -362,22 +362,21 @@ static rcgns_status read_mixed(rcgns_file *file, const rc_zone *zone, const rc_s
                                rcgns_message *message)
 {
   rc_array     offset = {.item = NULL}, data = {.item = NULL};
-  int64_t      a = 0, b = 0, cell = 0, row_lo, row_hi;
+  rc_cut       cut[2] = {{0, 0, 0}, {-RC_CUT, 0, 0}};
+  const int64_t end[2] = {lo, hi - 1};
+  int64_t      cell, row_lo, row_hi;
   rcgns_status status;
 
-  if (lo < hi) {
-    while (a + 1 < s->num_cuts && s->cut_cell[a + 1] <= lo) a++;
-    for (b = a; s->cut_cell[b] < hi;) b++;
-    cell = s->cut_cell[a];
-  }
-  row_lo = a * RC_CUT;
-  row_hi = b * RC_CUT < s->num_rows ? b * RC_CUT : s->num_rows;
-  status = rc_rows_read(file, zone, s, row_lo, lo < hi ? row_hi : row_lo, &offset, &data, message);
-  for (int64_t r = row_lo; r < row_hi && lo < hi && status == RCGNS_OK; r++) {
+  RC_TRY(rc_cuts_find(file, RCGNS_OK, s, true, lo < hi ? 2 : 0, end, cut, message));
+  cell   = cut[0].cell;
+  row_lo = cut[0].row;
+  row_hi = rc_clamp(cut[1].row + RC_CUT, 0, s->num_rows);
+  status = rc_rows_read(file, zone, s, row_lo, row_hi, &offset, &data, message);
+  for (int64_t r = row_lo; r < row_hi && status == RCGNS_OK; r++) {
     const int64_t *row = (const int64_t *)data.item + ((const int64_t *)offset.item)[r - row_lo];
     rc_shape       shape;
 
-    rc_element(file->version, row[0], &shape);
+    rc_mixed_nodes(file->version, row[0], &shape);
     if (shape == RC_NONE || r < s->row_lo || r >= s->row_hi) continue;
     if (cell >= lo && cell < hi) status = add_element(file, zone, e, s->first_cell + cell, shape, row + 1, message);
     cell++;

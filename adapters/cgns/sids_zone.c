@@ -1,8 +1,5 @@
-/* sids_zone -- zones and element sections: what is a volume cell, and where its row lies.
- *
- * Almost everything is known from the tree, alike on all ranks. Rows of MIXED sections and of polygon lists with inline counts
- * have no index in the file: one pass over the connectivity keeps the place of every RC_CUT-th row (by rank 0 in blocks, or by
- * all ranks where ElementStartOffset says where to begin), so that each rank can then read just its own rows. */
+/* sids_zone -- zones and element sections: what is a volume cell. Almost everything is known from the tree, alike on all ranks;
+ * rows that have no index there are looked for (sids_rows.c). */
 #include "cgns_private.h"
 
 #include <stdio.h>
@@ -10,8 +7,6 @@
 #include <string.h>
 
 enum { MIXED = 20, PYRA_13 = 21, NGON = 22, NFACE = 23, MAX_CODE = 56 };
-
-static const int64_t TOO_MANY = INT64_C(1) << 50; /* more than any file holds; sums of such counts do not overflow */
 
 /* ---- element types ------------------------------------------------------------------------------------------------ */
 
@@ -69,16 +64,6 @@ int rc_surface_corners(double version, int64_t code)
   return c < 0 || c > MAX_CODE || corners[c] == '.' ? 0 : corners[c] - '0';
 }
 
-/* Nodes of a row of MIXED: an element or, in old files, a polygon whose code says how many. 0: unknown. */
-static int64_t mixed_nodes(double version, int64_t code, rc_shape *shape)
-{
-  const int64_t polygon = version < 2.995 ? 21 : NGON;
-
-  *shape = RC_NONE;
-  if (version > 0.0 && version < 3.195 && code > polygon && code < TOO_MANY) return code - polygon;
-  return rc_element(version, code, shape);
-}
-
 /* ---- small readers ------------------------------------------------------------------------------------------------ */
 
 static const int64_t *ints(const rc_tree *tree, int64_t node, int64_t count)
@@ -94,180 +79,10 @@ bool rc_rind(const rc_tree *tree, int64_t parent, int nd, int64_t *rind)
   memset(rind, 0, 2 * (size_t)nd * sizeof *rind);
   if (at < 0) return true;
   for (int d = 0; value && d < 2 * nd; d++) {
-    if (value[d] < 0 || value[d] > TOO_MANY) return false;
+    if (value[d] < 0 || value[d] > RC_TOO_MANY) return false;
     rind[d] = value[d];
   }
   return value != NULL;
-}
-
-/* ---- rows without an index ---------------------------------------------------------------------------------------- */
-
-/* A walk along ElementConnectivity. */
-typedef struct scan {
-  double            version;
-  const rc_section *section;
-  int64_t           row, row_end, at, end; /* the next row and its place; where this rank stops */
-  int64_t           cells, curved;
-} scan;
-
-static int64_t row_length(const scan *s, int64_t head, rc_shape *shape)
-{
-  *shape = RC_NONE;
-  return s->section->layout == RC_MIXED ? mixed_nodes(s->version, head, shape) : head;
-}
-
-/* Rows that begin in data = connectivity [lo, hi). */
-static bool scan_block(scan *s, const int64_t *data, int64_t lo, int64_t hi)
-{
-  const rc_section *section = s->section;
-
-  for (; s->row < s->row_end && s->at < hi; s->row++) {
-    rc_shape      shape;
-    const int64_t n     = row_length(s, data[s->at - lo], &shape);
-    const bool    inner = s->row >= section->row_lo && s->row < section->row_hi;
-
-    if (n < 1 || n >= s->end - s->at) return false;
-    if (s->row % RC_CUT == 0) {
-      section->cut_at[s->row / RC_CUT]   = s->at;
-      section->cut_cell[s->row / RC_CUT] = s->cells;
-    }
-    s->cells += inner && (section->is_poly || shape != RC_NONE);
-    s->curved |= shape != RC_NONE && n > rc_corners(shape);
-    s->at += n + 1;
-  }
-  return true;
-}
-
-/* Where this rank begins and stops. Collective. */
-static rcgns_status scan_begin(rcgns_file *file, scan *s, rcgns_message *message)
-{
-  const rc_section *section = s->section;
-  const int64_t     blocks  = section->num_cuts - 1;
-  int64_t           end     = section->length;
-
-  if (section->offsets < 0) {
-    s->row_end = file->rank ? 0 : section->num_rows;
-    s->end     = file->rank ? 0 : end;
-    return RCGNS_OK;
-  }
-  s->row     = rc_share(blocks, file->rank, file->size) * RC_CUT;
-  s->row_end = rc_share(blocks, file->rank + 1, file->size) * RC_CUT;
-  if (s->row_end > section->num_rows) s->row_end = section->num_rows;
-  if (s->row > s->row_end) s->row = s->row_end;
-  {
-    const bool any = s->row < s->row_end;
-
-    RC_TRY(rc_read_1d(file, RCGNS_OK, section->offsets, s->row, s->row + any, 'I', &s->at, message));
-    RC_TRY(rc_read_1d(file, RCGNS_OK, section->offsets, s->row_end, s->row_end + any, 'I', &s->end, message));
-  }
-  if (s->row < s->row_end && (s->at < 0 || s->at > s->end || s->end > end)) s->at = s->end = -1; /* scan_block will refuse */
-  return RCGNS_OK;
-}
-
-/* The cuts of a section. Collective. */
-static rcgns_status find_cuts(rcgns_file *file, const rc_zone *zone, rc_section *section, bool *curved, rcgns_message *message)
-{
-  enum { BLOCK = 1 << 20 };
-  scan         s      = {.version = file->version, .section = section};
-  int64_t     *block  = rc_alloc(BLOCK, sizeof *block);
-  rcgns_status status = RCGNS_OK;
-  int64_t      rounds, before = 0, sum[2];
-
-  section->num_cuts = (section->num_rows + RC_CUT - 1) / RC_CUT + 1;
-  section->cut_at   = calloc((size_t)section->num_cuts, sizeof(int64_t));
-  section->cut_cell = calloc((size_t)section->num_cuts, sizeof(int64_t));
-  if (!block || !section->cut_at || !section->cut_cell) status = rc_no_memory(message);
-  RC_GOTO(done, status = rc_agree(file->comm, status, message));
-  RC_GOTO(done, status = scan_begin(file, &s, message));
-  rounds = (s.end - s.at + BLOCK - 1) / BLOCK;
-  MPI_Allreduce(MPI_IN_PLACE, &rounds, 1, MPI_INT64_T, MPI_MAX, file->comm);
-  {
-    const int64_t begin = s.at, end = s.end;
-    bool          ok = true;
-
-    for (int64_t r = 0; r < rounds; r++) {
-      const int64_t lo = begin + r * BLOCK, hi = lo + BLOCK < end ? lo + BLOCK : end;
-
-      RC_GOTO(done, status = rc_read_1d(file, RCGNS_OK, section->connectivity, lo, hi < lo ? lo : hi, 'I', block, message));
-      ok = ok && (lo >= hi || scan_block(&s, block, lo, hi));
-    }
-    if (!ok || s.row != s.row_end || s.at != s.end)
-      status = rc_fail(message, RCGNS_IO,
-                       "%s: zone %s: section %s is damaged at its row %lld: its rows do not fill its connectivity", file->path,
-                       zone->name, rc_node_at(&file->tree, rc_node_at(&file->tree, section->connectivity)->parent)->name,
-                       (long long)s.row + 1);
-  }
-  RC_GOTO(done, status = rc_agree(file->comm, status, message));
-  MPI_Exscan(&s.cells, &before, 1, MPI_INT64_T, MPI_SUM, file->comm);
-  if (file->rank == 0) before = 0;
-  if (section->offsets >= 0)
-    for (int64_t r = rc_share(section->num_cuts - 1, file->rank, file->size); r * RC_CUT < s.row_end; r++)
-      section->cut_cell[r] += before;
-  MPI_Allreduce(MPI_IN_PLACE, section->cut_at, (int)section->num_cuts, MPI_INT64_T, MPI_SUM, file->comm);
-  MPI_Allreduce(MPI_IN_PLACE, section->cut_cell, (int)section->num_cuts, MPI_INT64_T, MPI_SUM, file->comm);
-  sum[0] = s.cells;
-  sum[1] = s.curved;
-  MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPI_INT64_T, MPI_SUM, file->comm);
-  section->cut_at[section->num_cuts - 1]   = section->length;
-  section->cut_cell[section->num_cuts - 1] = sum[0];
-  section->num_cells                       = sum[0];
-  *curved |= sum[1] > 0;
-done:
-  free(block);
-  return status;
-}
-
-rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
-                          rc_array *offset, rc_array *data, rcgns_message *message)
-{
-  const int64_t n       = hi - lo;
-  const bool    indexed = section->layout == RC_OFFSETS;
-  const scan    s       = {.version = file->version, .section = section};
-  int64_t       from = 0, to = 0, row = lo, kept = 0;
-  int64_t      *at, *in;
-  rcgns_status  status = RCGNS_OK;
-
-  offset->count = data->count = 0;
-  if (!rc_reserve(offset, n + 1, sizeof(int64_t))) status = rc_no_memory(message);
-  at = offset->item;
-  if (indexed) {
-    RC_TRY(rc_read_1d(file, status, section->offsets, lo, n ? hi + 1 : lo, 'I', at, message));
-    for (int64_t i = 0; i < n; i++)
-      if (at[i] < 0 || at[i] > at[i + 1] || at[i + 1] > section->length)
-        status = rc_fail(message, RCGNS_IO, "%s: zone %s: ElementStartOffset is not ascending at row %lld", file->path,
-                         zone->name, (long long)(lo + i + 1));
-    from = n ? at[0] : 0;
-    to   = n ? at[n] : 0;
-  } else if (n) {
-    row  = lo / RC_CUT * RC_CUT;
-    from = section->cut_at[lo / RC_CUT];
-    to   = section->cut_at[(hi + RC_CUT - 1) / RC_CUT];
-  }
-  if (status == RCGNS_OK && !rc_reserve(data, to - from, sizeof(int64_t))) status = rc_no_memory(message);
-  in = data->item;
-  RC_TRY(rc_read_1d(file, status, section->connectivity, from, to, 'I', in, message));
-  offset->count = n + 1;
-  if (!n) at[0] = 0;
-  if (indexed) {
-    for (int64_t i = n; i >= 0 && n; i--) at[i] -= from;
-    data->count = to - from;
-    return RCGNS_OK;
-  }
-  for (int64_t p = 0; row < hi && status == RCGNS_OK; row++) { /* the scan found every row sound: drop what is not asked for */
-    rc_shape      shape;
-    const int64_t length = row_length(&s, in[p], &shape);
-    const int64_t skip = section->layout == RC_MIXED ? 0 : 1, size = length + 1 - skip;
-
-    if (row >= lo) {
-      at[row - lo] = kept;
-      memmove(in + kept, in + p + skip, (size_t)size * sizeof *in);
-      kept += size;
-    }
-    p += length + 1;
-  }
-  if (n) at[n] = kept;
-  data->count = kept;
-  return RCGNS_OK;
 }
 
 /* ---- sections ----------------------------------------------------------------------------------------------------- */
@@ -297,7 +112,7 @@ static rcgns_status read_section(const rcgns_file *file, const rc_zone *zone, in
     if (*code >= 0 && *code <= MAX_CODE) return RCGNS_OK;
     return broken(file, zone, name, "has an unknown element type", message);
   }
-  if (!range || range[0] < 1 || range[1] < range[0] || range[1] > TOO_MANY)
+  if (!range || range[0] < 1 || range[1] < range[0] || range[1] > RC_TOO_MANY)
     return broken(file, zone, name, "has no valid ElementRange", message);
   if (!rc_rind(tree, node, 1, rind)) return broken(file, zone, name, "has a malformed Rind", message);
   s->first        = range[0];
@@ -412,7 +227,7 @@ static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message
     status = rc_read(file, status, s->parents, &box, lo, hi, 'I', parent, message);
     for (int64_t k = 0; k < hi - lo && status == RCGNS_OK; k++) {
       if (!parent[k]) continue;
-      if (parent[k] < 0 || parent[k] > TOO_MANY) {
+      if (parent[k] < 0 || parent[k] > RC_TOO_MANY) {
         status = rc_fail(message, RCGNS_GEOMETRY, "%s: zone %s: ParentElements names cell %lld", file->path, zone->name,
                          (long long)parent[k]);
         break;
@@ -449,14 +264,14 @@ static rcgns_status read_sizes(const rcgns_file *file, rc_zone *zone, rcgns_mess
   if (!size) return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are missing", file->path, zone->name);
   zone->is_structured = strcmp(type, "Unstructured") != 0;
   if (!zone->is_structured) {
-    if (size[0] < 0 || size[0] > TOO_MANY)
+    if (size[0] < 0 || size[0] > RC_TOO_MANY)
       return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are not valid", file->path, zone->name);
     zone->vertices[0] = zone->num_nodes = size[0];
     return RCGNS_OK;
   }
   if (count != 9) return RCGNS_OK;
   for (int d = 0; d < 3; d++) {
-    if (size[d] < 1 || size[d + 3] != size[d] - 1 || __builtin_mul_overflow(product, size[d], &product) || product > TOO_MANY)
+    if (size[d] < 1 || size[d + 3] != size[d] - 1 || __builtin_mul_overflow(product, size[d], &product) || product > RC_TOO_MANY)
       return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are not valid", file->path, zone->name);
     zone->vertices[d] = size[d];
     zone->cells[d]    = size[d + 3];
@@ -509,7 +324,7 @@ static rcgns_status read_zone(rcgns_file *file, rc_zone *zone, bool *keep, rcgns
   for (int64_t i = 0; i < zone->num_sections; i++) {
     rc_section *s = zone->section + i;
 
-    if (s->layout == RC_MIXED || s->layout == RC_INLINE) RC_TRY(find_cuts(file, zone, s, &curved, message));
+    if (s->layout == RC_MIXED || s->layout == RC_INLINE) RC_TRY(rc_rows_scan(file, zone, s, &curved, message));
     s->first_cell = zone->num_cells;
     zone->num_cells += s->num_cells;
   }
@@ -517,7 +332,7 @@ static rcgns_status read_zone(rcgns_file *file, rc_zone *zone, bool *keep, rcgns
   *keep = zone->num_cells > 0;
   if (!*keep) return RCGNS_OK;
   for (int64_t i = 0; i < zone->num_face_sections; i++)
-    if (zone->face[i].layout == RC_INLINE) RC_TRY(find_cuts(file, zone, zone->face + i, &curved, message));
+    if (zone->face[i].layout == RC_INLINE) RC_TRY(rc_rows_scan(file, zone, zone->face + i, &curved, message));
   if (curved && rc_is_dual(file))
     return rc_fail(message, RCGNS_IO,
                    "%s: zone %s: it has higher-order elements, whose middle nodes have no dual cells: make them linear",
@@ -528,14 +343,8 @@ static rcgns_status read_zone(rcgns_file *file, rc_zone *zone, bool *keep, rcgns
 
 static void drop_zone(rc_zone *zone)
 {
-  for (int64_t i = 0; i < zone->num_sections; i++) {
-    free(zone->section[i].cut_at);
-    free(zone->section[i].cut_cell);
-  }
-  for (int64_t i = 0; i < zone->num_face_sections; i++) {
-    free(zone->face[i].cut_at);
-    free(zone->face[i].cut_cell);
-  }
+  for (int64_t i = 0; i < zone->num_sections; i++) rc_drop(&zone->section[i].cut);
+  for (int64_t i = 0; i < zone->num_face_sections; i++) rc_drop(&zone->face[i].cut);
   free(zone->section);
   free(zone->face);
 }

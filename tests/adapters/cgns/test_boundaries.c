@@ -126,10 +126,11 @@ static void blocks_name_faces_by_lists(void)
   cf_remove(path);
 }
 
-static void elements_are_named_by_lists_of_faces_and_vertices(void)
+/* A quadrangle and a triangle of a MIXED section begin with these codes. */
+static void check_lists(double version, int64_t quadrangle, int64_t triangle)
 {
-  const int64_t mixed[9] = {7, 2, 3, 9, 8, 5, 8, 9, 14}, one[2] = {1, 1}, bottom[4] = {1, 2, 5, 4};
-  cf_file      *f    = cf_new(3.4);
+  const int64_t mixed[9] = {quadrangle, 2, 3, 9, 8, triangle, 8, 9, 14}, one[2] = {1, 1}, bottom[4] = {1, 2, 5, 4};
+  cf_file      *f    = cf_new(version);
   const int64_t base = cf_base(f), zone = cf_zoo_zone(f, base, "Zoo"), list = cf_empty(f, zone, "ZoneBC", "ZoneBC_t");
   double        area;
   char          path[64];
@@ -159,6 +160,12 @@ static void elements_are_named_by_lists_of_faces_and_vertices(void)
   }
   rcgns_close(&file);
   cf_remove(path);
+}
+
+static void elements_are_named_by_lists_of_faces_and_vertices(void)
+{
+  check_lists(3.4, 7, 5);
+  check_lists(3.1, 22 + 4, 22 + 3); /* polygons, as old files may have them */
 }
 
 static void polyhedra_are_named_by_lists_of_faces(void)
