@@ -5,6 +5,7 @@ set(REMAP_TEST_ENV
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_mpi_yield_when_idle=1
   OMPI_MCA_hwloc_base_binding_policy=none # tests side by side would all sit on the first cores
   OMPI_MCA_btl_vader_single_copy_mechanism=none # containers forbid it
+  OMPI_MCA_odls_base_sigkill_timeout=0 # mpiexec else sleeps a second after each program that fails, as many shall
   REMAP_SHARED_DATA=${REMAP_SHARED_DATA})
 if(REMAP_LONG_TESTS)
   list(APPEND REMAP_TEST_ENV REMAP_LONG_TESTS=1)
