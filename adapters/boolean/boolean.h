@@ -98,7 +98,9 @@ typedef struct bool_content {
  *  neither has), IO, INTERNAL. */
 cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_context *ctx, const bool_operand operand[2],
                            const remap_supermesh_view *view, bool_content *out, cli_failure *why);
-void     bool_content_drop(bool_content *content);
+
+/** Give it back. Not collective. */
+void bool_content_drop(bool_content *content);
 
 /* ---- output -------------------------------------------------------------------------------------------------------- */
 

@@ -75,6 +75,7 @@ typedef struct rc_array {
 bool rc_reserve(rc_array *array, int64_t more, size_t size);
 /* Append one int64_t. */
 bool rc_push(rc_array *array, int64_t value);
+/* Give an array back; it is empty then. */
 void rc_drop(rc_array *array);
 /* malloc for count items, never NULL for 0 of them; NULL if the product overflows or memory is short. */
 void *rc_alloc(int64_t count, size_t size);
@@ -91,7 +92,8 @@ typedef struct rc_map {
 int64_t rc_map_add(rc_map *map, const int64_t *key);
 /* Index of the key, -1: it is not there. */
 int64_t rc_map_find(const rc_map *map, const int64_t *key);
-void    rc_map_drop(rc_map *map);
+/* Give a map back; it is empty then, of the same width. */
+void rc_map_drop(rc_map *map);
 
 /* ---- distribution ------------------------------------------------------------------------------------------------- */
 
@@ -164,7 +166,8 @@ int64_t rc_tree_find(const rc_tree *tree, int64_t parent, int64_t after, const c
 void rc_tree_string(const rc_tree *tree, int64_t node, char *out, size_t size);
 /* Rank 0's tree to all. Collective. */
 rcgns_status rc_tree_bcast(MPI_Comm comm, rc_tree *tree, rcgns_message *message);
-void         rc_tree_drop(rc_tree *tree);
+/* Give a tree back. */
+void rc_tree_drop(rc_tree *tree);
 
 /* ---- the two kinds of file ---------------------------------------------------------------------------------------- */
 
@@ -177,7 +180,8 @@ typedef struct rc_box {
 /* The whole payload of a node. */
 rc_box rc_whole(const rc_node *node);
 /* Cut the linear range [lo, hi) of the box into at most RC_MAX_BOXES boxes, in order. Returns how many. */
-int     rc_box_cut(const rc_box *box, int64_t lo, int64_t hi, rc_box *part);
+int rc_box_cut(const rc_box *box, int64_t lo, int64_t hi, rc_box *part);
+/* How many items a box has. */
 int64_t rc_box_count(const rc_box *box);
 
 /* Is it an HDF5 file? Not collective. */
@@ -186,16 +190,23 @@ bool rc_h5_is_file(const char *path);
 rcgns_status rc_h5_walk(rc_tree *tree, rcgns_message *message);
 /* Open for parallel reading. Collective; the handle is 64-bit, -1 after a failure. */
 rcgns_status rc_h5_open(MPI_Comm comm, const char *path, int64_t *handle, rcgns_message *message);
-void         rc_h5_close(int64_t handle);
+/* Close it. Collective. */
+void rc_h5_close(int64_t handle);
 /* Read [lo, hi), not empty, of box from the node at path: as 'I' int64_t, 'R' double, 'N' its own type. Not collective. */
 rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
                         void *out, rcgns_message *message);
 
 /* The same for ADF, through cgio; every call is for one rank alone. */
-bool         rc_adf_is_file(const char *path);
+
+/* As rc_h5_is_file. */
+bool rc_adf_is_file(const char *path);
+/* As rc_h5_walk. */
 rcgns_status rc_adf_walk(rc_tree *tree, rcgns_message *message);
+/* As rc_h5_open. */
 rcgns_status rc_adf_open(const char *path, int64_t *handle, rcgns_message *message);
-void         rc_adf_close(int64_t handle);
+/* As rc_h5_close. */
+void rc_adf_close(int64_t handle);
+/* As rc_h5_read. */
 rcgns_status rc_adf_read(int64_t handle, const char *path, const char *type, const rc_box *box, int64_t lo, int64_t hi, char as,
                          void *out, rcgns_message *message);
 
@@ -310,14 +321,15 @@ rcgns_status rc_read_1d(rcgns_file *file, rcgns_status mine, int64_t node, int64
 
 /* Find the zones with volume cells and count them. Collective. */
 rcgns_status rc_zones_find(rcgns_file *file, const char *base, rcgns_message *message);
-void         rc_zones_drop(rcgns_file *file);
+/* Give back what it found. */
+void rc_zones_drop(rcgns_file *file);
 /* Nodes of an element type as files of this version write it: *shape, and how many; 0: unknown. */
 int rc_element(double version, int64_t code, rc_shape *shape);
 /* Corners of a surface element of that type, 0: it is none. */
 int rc_surface_corners(double version, int64_t code);
 /* Corners of a shape. */
 int rc_corners(rc_shape shape);
-/* Nodes of a row of MIXED that begins with that code: of an element, or of a polygon, as old files may have them; 0: unknown. */
+/* Nodes of a row of MIXED that begins with that code: of an element, or of a polygon, which old files may have; 0: unknown. */
 int64_t rc_mixed_nodes(double version, int64_t code, rc_shape *shape);
 /* Corners of a surface that such a row is and a volume element may have, 0: it is none. */
 int rc_mixed_surface_corners(double version, int64_t code);
@@ -350,7 +362,8 @@ rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_secti
 bool rc_number_node(rcgns_file *file, const rc_zone *zone, int64_t node);
 /* Put the median-dual mesh in the place of this rank's: its cells are the vertices. Collective. */
 rcgns_status rc_dual_build(rcgns_file *file, rcgns_message *message);
-void         rc_mesh_drop(rc_mesh *mesh);
+/* Give a mesh back. */
+void rc_mesh_drop(rc_mesh *mesh);
 /* What rcgns_mesh hands out, from what was built. */
 void rc_mesh_view(rcgns_file *file);
 /* Are values of the nodes located at cells, for this file? */
@@ -388,7 +401,8 @@ typedef struct rc_plan {
 int64_t rc_plan_add(rc_plan *plan, int64_t parent, const char *name, const char *label, const char *type, int nd,
                     const int64_t *dim, char kind, const void *literal);
 static inline rc_entry *rc_entry_at(const rc_plan *plan, int64_t i) { return (rc_entry *)plan->entry.item + i; }
-void                    rc_plan_drop(rc_plan *plan);
+/* Give a plan back; the arrays that its entries borrow are their owners'. */
+void rc_plan_drop(rc_plan *plan);
 
 /* A plan whose arrays it owns; ok turns false where memory runs out, and stays so. */
 typedef struct rc_draft {
@@ -405,8 +419,10 @@ int64_t rc_draft_put(rc_draft *d, int64_t parent, const char *name, const char *
 /* Integers, as I4 where they fit. */
 int64_t rc_draft_ints(rc_draft *d, int64_t parent, const char *name, const char *label, int nd, const int64_t *dim,
                       const int64_t *values);
-void    rc_draft_text(rc_draft *d, int64_t parent, const char *name, const char *label, const char *text);
-void    rc_draft_drop(rc_draft *d);
+/* A text, as C1. */
+void rc_draft_text(rc_draft *d, int64_t parent, const char *name, const char *label, const char *text);
+/* Give a draft back, and all that it owns. */
+void rc_draft_drop(rc_draft *d);
 
 /* Is it a name for a node? */
 bool rc_is_name(const char *name);

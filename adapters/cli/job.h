@@ -93,8 +93,10 @@ cli_exit cli_priority_cut(cli_job *j, cli_failure *why);
 /** End a cut and set *cut to NULL. Collective, and harmless on NULL. */
 void cli_cut_drop(cli_cut **cut);
 
-/** The cells of one side on this rank as the library has them: how many, and their global numbers. Not collective. */
-int64_t        cli_num_cells(const cli_job *j, remap_side side);
+/** How many cells of one side this rank lends to the library. Not collective. */
+int64_t cli_num_cells(const cli_job *j, remap_side side);
+
+/** Their global numbers, [cli_num_cells]. Owned by the job. Not collective. */
 const int64_t *cli_cells(const cli_job *j, remap_side side);
 
 /** Lend one side to the library, with the solver's volumes. Not collective. */

@@ -50,8 +50,10 @@ cli_exit cli_options_parse(int argc, char **argv, cli_options *out, cli_failure 
 /** What --help prints. Not collective. */
 void cli_options_help(FILE *out);
 
-/** The words of the command line for a limiter and for a nature. Static text. Not collective. */
+/** The word of the command line for a limiter. Static text. Not collective. */
 const char *cli_limiter_word(remap_limiter limiter);
+
+/** The word of the command line for a nature. Static text. Not collective. */
 const char *cli_nature_word(remap_nature nature);
 
 /** The nature that a word of the command line names; false if it names none. Not collective. */

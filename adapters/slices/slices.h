@@ -94,10 +94,11 @@ void rslice_drop(rslice_rows *rows);
 /** The nodes' coordinates: rows of 3 words, doubles bit by bit. Collective. */
 rslice_status rslice_nodes(MPI_Comm comm, const remap_supermesh_view *mesh, rslice_rows *out);
 
+enum { RSLICE_FACE_HEAD = 4 }; /**< words of a row of rslice_faces before the nodes */
+
 /** The faces: rows {owner, neighbour or -1, boundary or -1, origin, nodes ...}, all global numbers; the normal points out of
  *  the owner, which is the lower cell; the loop begins at its lowest node. Origin: 1 if it lies in a face of the source, plus 2
  *  if it lies in one of the target. Collective. */
-enum { RSLICE_FACE_HEAD = 4 }; /**< words of such a row before the nodes */
 rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_rows *out);
 
 /** The cells: rows {ancestors, volume, fields ..., then their faces}; ancestors as in their fields, numbers bit by bit. Faces

@@ -36,6 +36,7 @@
 /* Format the message and return the status. */
 rsurf_status rs_fail(rsurf_message *message, rsurf_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* MEMORY, with the words for it. */
 rsurf_status rs_no_memory(rsurf_message *message);
 
 /* calloc, never NULL for 0 items; NULL if memory is short. */
@@ -62,7 +63,8 @@ typedef struct rs_map {
 int64_t rs_map_add(rs_map *map, const uint64_t *key);
 /* Index of the key, -1: it is not there. */
 int64_t rs_map_find(const rs_map *map, const uint64_t *key);
-void    rs_map_drop(rs_map *map);
+/* Give a map back; it is empty then, of the same width. */
+void rs_map_drop(rs_map *map);
 
 /* ---- reading ------------------------------------------------------------------------------------------------------- */
 
@@ -78,13 +80,16 @@ typedef struct rs_input {
   rsurf_message *message;
 } rs_input;
 
-/* The node at a place, -1: no memory. Where it was read is for the message: "line", 7. */
+/* The node at a place, the one that is there already if its bits are alike. Where it was read is for messages: "line", 7.
+ * IO (not finite), MEMORY. */
 rsurf_status rs_node(rs_input *in, const double xyz[3], const char *unit, int64_t where, int64_t *node);
-/* A face of the current group. */
+/* Add a face of the current group. MEMORY. */
 rsurf_status rs_face(rs_input *in, const int64_t *node, int64_t n);
-/* The group of the faces to come; a name without letters stands for the file's. */
+/* The group of the faces to come; a name without letters stands for the file's. MEMORY. */
 rsurf_status rs_group(rs_input *in, const char *name, size_t length);
+/* All facets of an STL file, binary or text. IO (with the line or the facet), MEMORY. */
 rsurf_status rs_read_stl(rs_input *in);
+/* All faces of an OBJ file. IO (with the line), MEMORY. */
 rsurf_status rs_read_obj(rs_input *in);
 
 /* ---- exact.c ------------------------------------------------------------------------------------------------------- */
@@ -117,12 +122,14 @@ typedef struct rs_edges {
 
 /* false: no memory; then too the edges must be dropped. */
 bool rs_find_edges(const rsurf_surface *surface, rs_edges *e);
+/* Give edges back. */
 void rs_edges_drop(rs_edges *e);
 /* Triangles whose corners are on a line lend their middle corner to the neighbour, where that can be. */
 rsurf_status rs_flip_caps(rsurf_surface *surface, const double *xyz, rsurf_repairs *repairs, rsurf_message *message);
 
 /* Flat convex polygons as fans. The caller frees corner and face. false: no memory. */
 bool rs_fan(const rsurf_surface *surface, rs_triangles *out);
+/* Let a face run the other way round. */
 void rs_turn_face(rsurf_surface *surface, int64_t face);
 /* "(x y z)", cut to fit; its length. */
 size_t rs_put_point(const double *x, char *out, size_t size);
@@ -139,9 +146,11 @@ typedef struct rs_tree {
 bool rs_tree_build(int64_t num, const double (*box)[6], rs_tree *out);
 /* Numbers of the boxes that meet a box, in hits, which is overwritten. false: no memory. */
 bool rs_tree_find(const rs_tree *tree, const double box[6], rs_array *hits);
-/* Hear of each pair of boxes that meet, once, until visit returns false. */
+/* What hears of two boxes that meet; false: of no more. */
 typedef bool (*rs_visit)(void *user, int64_t one, int64_t other);
+/* Let visit hear of each pair of boxes that meet, once. */
 void rs_tree_pairs(const rs_tree *tree, rs_visit visit, void *user);
+/* Give a tree back; its boxes are the caller's. */
 void rs_tree_drop(rs_tree *tree);
 
 /* Shells into bodies: checks that triangles do not cross, turns faces and notes it in turned [faces]. shell [faces]; xyz

@@ -449,6 +449,8 @@ REMAP_API remap_status remap_field(remap_context *ctx, remap_direction direction
  *  Errors: those of remap_field; BAD_ORDER also where the other half is missing. */
 REMAP_API remap_status remap_field_start(remap_context *ctx, remap_direction direction, const remap_transfer *transfer,
                                          int num_fields, const remap_field_desc *fields);
+
+/** The other half of remap_field_start, which says what holds for both. */
 REMAP_API remap_status remap_field_finish(remap_context *ctx, remap_direction direction, remap_field_report *reports);
 
 /** The greatest of the ranks' statuses, for callers who want their own failures to be shared. Collective. */

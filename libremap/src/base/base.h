@@ -76,8 +76,9 @@ void rm_arena_fail_at(rm_arena *arena, int64_t n);
  * Start from NULL and 0; the caller frees *data. NO_MEMORY leaves the array as it was. */
 remap_status rm_grow(void *data, int64_t *capacity, int64_t need, size_t size);
 
-/* a + b and a * b of counts, saturating at INT64_MAX (so that an allocation of the result fails). Arguments >= 0. */
+/* a + b of counts, saturating at INT64_MAX (so that an allocation of the result fails). Arguments >= 0. */
 int64_t rm_add_sat(int64_t a, int64_t b);
+/* a * b, likewise. */
 int64_t rm_mul_sat(int64_t a, int64_t b);
 
 /* The greater of two numbers, neither of them NaN: for loops in which the call of fmax would count. */
@@ -94,8 +95,8 @@ typedef struct rm_keyed {
 void rm_sort_keyed(rm_keyed *data, rm_keyed *scratch, int64_t n);
 /* Sort doubles ascending (-0 before +0); in place, no allocation, O(n log n), quick for short lists. No NaN. */
 void rm_sort_doubles(double *data, int64_t n);
-/* Sort words ascending; in place, no allocation, O(n log n), by insertion up to RM_FEW_WORDS of them. */
 enum { RM_FEW_WORDS = 24 };
+/* Sort words ascending; in place, no allocation, O(n log n), by insertion up to RM_FEW_WORDS of them. */
 void rm_sort_words(uint64_t *data, int64_t n);
 /* Sum of a list that does not depend on its order: sorts data by value, then adds with compensation. */
 double rm_sum_sorted(double *data, int64_t n);
@@ -104,8 +105,9 @@ int64_t rm_offsets(int64_t *count, int64_t n);
 
 /* ---- hashing --------------------------------------------------------------------------------------------------- */
 
-/* A well mixed 64-bit hash of one word, and of the three coordinates of a point (-0 and +0 alike). */
+/* A well mixed 64-bit hash of one word. */
 uint64_t rm_hash_word(uint64_t x);
+/* The same of the three coordinates of a point, -0 and +0 alike. */
 uint64_t rm_hash_point(const double xyz[3]);
 
 /* ---- exact sums ------------------------------------------------------------------------------------------------ */
@@ -118,10 +120,13 @@ typedef struct rm_sum {
   int64_t limb[RM_SUM_LIMBS];
   int64_t added; /* additions since the last carry */
 } rm_sum;
+/* Make it 0, as {0} is. */
 void rm_sum_clear(rm_sum *sum);
+/* Add a number. */
 void rm_sum_add(rm_sum *sum, double x);
 /* Add the product x * y exactly (as two doubles, by an error-free product; |x y| within 2^-960..2^1000 or 0). */
 void rm_sum_add_product(rm_sum *sum, double x, double y);
+/* Add another sum, as if all its numbers came. */
 void rm_sum_merge(rm_sum *sum, const rm_sum *other);
 /* Normalise limbs so that |limb| < 2^32: before summing accumulators of many ranks limb by limb. */
 void rm_sum_carry(rm_sum *sum);

@@ -83,6 +83,7 @@ typedef struct rm_view {
   int             x, y; /* axes */
   int             flip; /* +1, -1 */
 } rm_view;
+/* The view of a triangle, which has area, of mesh `side`. */
 rm_view rm_view_of(const rm_limit *l, int side, rm_lid t);
 /* +1 if p, q, r turn counter-clockwise, -1 clockwise, 0 if they are on a line. Exact. */
 int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r);
@@ -172,14 +173,14 @@ rm_lid rm_arcs_at(const rm_arcs *arcs, rm_lid low);
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
 
-/* cell[2 k] and cell[2 k + 1] are the cells left and right of polygon k, RM_OUTSIDE; label and volume of each cell. All live in
- * arena. BAD_MESH if the polygons around an edge do not bound cells. */
+/* cell[2 k] and cell[2 k + 1] are the cells left and right of polygon k, RM_OUTSIDE; label and volume of each cell. */
 typedef struct rm_glued {
   rm_lid          num_cells;
   const rm_lid   *cell;
   const rm_label *label;
   const double   *volume;
 } rm_glued;
+/* Glue polygons to cells around their edges. All lives in arena. BAD_MESH if the polygons around an edge bound no cells. */
 remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, rm_glued *out);
 
 /* Which polygons make one face. Its loop is counter-clockwise about the normal out of the lower cell, RM_OUTSIDE being the

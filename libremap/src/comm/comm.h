@@ -12,6 +12,7 @@ typedef struct rm_comm {
 
 /* Duplicate comm, with MPI errors returned instead of fatal. The caller owns *out: rm_comm_free. */
 remap_status rm_comm_dup(MPI_Comm comm, rm_comm *out);
+/* Free the duplicate. Collective. */
 void rm_comm_free(rm_comm *comm);
 
 /* One status for all: the greatest number wins; *first_rank (may be NULL) is the lowest rank that has it. */
@@ -19,10 +20,13 @@ remap_status rm_comm_agree(const rm_comm *comm, remap_status mine, int *first_ra
 /* The same, and *reason (may be NULL) becomes that rank's everywhere: unchanged if all is well, empty if MPI failed. */
 remap_status rm_comm_agree_reason(const rm_comm *comm, remap_status mine, rm_reason *reason);
 
-/* In place over all ranks, elementwise. */
+/* Sums over all ranks, in place, elementwise. */
 remap_status rm_comm_sum_i64(const rm_comm *comm, int64_t *value, int n);
+/* The greatest, likewise. */
 remap_status rm_comm_max_i64(const rm_comm *comm, int64_t *value, int n);
+/* The greatest, likewise; no NaN. */
 remap_status rm_comm_max_f64(const rm_comm *comm, double *value, int n);
+/* The least, likewise; no NaN. */
 remap_status rm_comm_min_f64(const rm_comm *comm, double *value, int n);
 /* Sum of exact accumulators; the same on every rank whatever the partition. */
 remap_status rm_comm_sum_exact(const rm_comm *comm, rm_sum *sum, int n);

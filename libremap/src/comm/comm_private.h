@@ -18,15 +18,25 @@ static inline remap_status rm_comm_status(int mpi)
  * [comm->size + 1]. Collective; before it is called again the ranks have to meet, in any collective call. */
 remap_status rm_comm_counts(const rm_comm *comm, const int64_t *send_offset, int64_t *count);
 
-/* As rm_comm_allgather, rm_comm_allgatherv, rm_comm_exchange, rm_plan_run and rm_flow_init, with messages of at most chunk
- * bytes, 1 <= chunk <= RM_COMM_CHUNK, the same on every rank. */
+/* The functions of comm.h of the same names, with messages of at most chunk bytes, 1 <= chunk <= RM_COMM_CHUNK, the same on
+ * every rank. */
+
+/* As rm_comm_allgather. Collective. */
 remap_status rm_comm_allgather_chunked(const rm_comm *comm, int64_t chunk, const void *mine, void *all, int64_t n, size_t size);
+
+/* As rm_comm_allgatherv. Collective. *all lives in arena. */
 remap_status rm_comm_allgatherv_chunked(const rm_comm *comm, int64_t chunk, rm_arena *arena, const void *mine, int64_t n,
                                         size_t size, int64_t *offset, void **all);
+
+/* As rm_comm_exchange. Collective. *recv lives in arena. */
 remap_status rm_comm_exchange_chunked(const rm_comm *comm, int64_t chunk, rm_arena *arena, size_t size,
                                       const int64_t *send_offset, const void *send, int64_t *recv_offset, void **recv);
+
+/* As rm_plan_run. Among neighbours. */
 remap_status rm_plan_run_chunked(const rm_comm *comm, int64_t chunk, const rm_plan *plan, size_t size, const void *item,
                                  void *received, void *buffer);
+
+/* As rm_flow_init. Not collective. *out lives in arena. */
 remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out);
 
 /* Tags of messages. Whoever says something says it first with RM_TAG_FIRST, in a message of RM_FIRST_BYTES at most, for which

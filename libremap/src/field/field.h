@@ -84,9 +84,10 @@ typedef struct rm_load {
 
 /* The load of a transfer. Not collective. */
 rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, int num_fields, const remap_field_desc *fields);
-/* A load that covers both, and whether the first covers the second. */
+/* A load that covers both. */
 rm_load rm_load_max(rm_load a, rm_load b);
-bool    rm_load_covers(rm_load a, rm_load b);
+/* Does the first cover the second? */
+bool rm_load_covers(rm_load a, rm_load b);
 
 /* carrier -- takes fields from the giving to the receiving cells, again and again, without taking memory and among neighbours
  * only. It holds buffers and what is under way, but nothing that changes a result: results depend neither on partition nor on
@@ -98,8 +99,8 @@ typedef struct rm_carrier rm_carrier;
 remap_status rm_carrier_build(rm_arena *arena, const rm_transfer_setup *setup, rm_load load, rm_carrier **out,
                               rm_reason *reason);
 
-/* The plans along which it sends, and their number; the same on every rank. Not collective. */
 enum { RM_CARRIER_PLANS = 5 };
+/* The plans along which it sends, and their number; the same on every rank. Not collective. */
 int rm_carrier_plans(const rm_carrier *carrier, const rm_plan *plan[RM_CARRIER_PLANS]);
 
 /* Hold this parley in every transfer from the next on, instead of one with the plans' neighbours, which are among its peers. */

@@ -262,8 +262,9 @@ struct rm_profile {
 remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *profile);
 /* Does a transfer read the halo? */
 bool rm_profile_reads_halo(const rm_packing *packing);
-/* Send the halo's numbers; then, once all else is done that can be without them, finish: the whole pack. Among neighbours. */
+/* Send the halo's numbers. What can be done without them is done before rm_profile_finish. Among neighbours. */
 void rm_profile_post(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
+/* Receive them and make the whole pack. Among neighbours. */
 void rm_profile_finish(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
 /* Wait for what is under way. */
 void rm_profile_abandon(rm_profile *profile, const rm_comm *comm, rm_word *word);
@@ -273,14 +274,16 @@ void rm_profile_abandon(rm_profile *profile, const rm_comm *comm, rm_word *word)
 /* Find the systems among the fields of a packing. Fields have passed rm_systems_check. */
 void rm_systems_find(rm_packing *packing);
 
-/* Of one cell, [num_fields] each: what is reconstructed, from what is given (may be the same array); the amount per volume of a
- * field, from both; what is given, from amounts per volume, in place. Fields outside of systems stay as they are. False if a
- * density is not positive; *bad is its field then. Is the internal energy of a system reconstructed per mass, not per volume?
- */
-bool   rm_system_is_energy_per_mass(const rm_packing *packing, int s);
-bool   rm_system_numbers(const rm_packing *packing, const double *given, double *number, int *bad);
+/* Is the internal energy of system s reconstructed per mass, not per volume? */
+bool rm_system_is_energy_per_mass(const rm_packing *packing, int s);
+/* Of one cell: what is reconstructed, number [num_fields], from what is given [num_fields], which may be the same array. Fields
+ * outside of systems stay as they are. False if a density is not positive; *bad is its field then. */
+bool rm_system_numbers(const rm_packing *packing, const double *given, double *number, int *bad);
+/* Of one cell: the amount per volume of field f, from both. */
 double rm_system_amount(const rm_packing *packing, int f, const double *given, const double *number);
-void   rm_system_restore(const rm_packing *packing, double *value);
+/* Of one cell: what is given, from amounts per volume, value [num_fields] in place. Fields outside of systems stay as they are.
+ */
+void rm_system_restore(const rm_packing *packing, double *value);
 
 /* The polynomials of a system's amounts per volume, of degree 2, from those of density and amounts per mass. place is the
  * cell's in the pack; second and volume are the cell's moments. The mean over the cell stays its amount. */
@@ -294,8 +297,9 @@ typedef struct rm_limits {
   double *least, *greatest;
 } rm_limits;
 
-/* No limits yet; and those of one more giver, from its place in a pack, for all fields of systems. */
+/* No limits yet, for all fields of systems. */
 void rm_limits_clear(const rm_packing *packing, rm_limits limits);
+/* Widen them by one more giver, from its place in a pack. */
 void rm_limits_add(const rm_packing *packing, const double *place, rm_limits limits);
 
 /* The greatest factor in [0, 1] by which change may be added to content, scaled amounts in a volume, [num_fields] each, so that
@@ -314,6 +318,7 @@ typedef struct rm_admission {
   double  *room;      /* [4][num_fields]                               */
 } rm_admission;
 
+/* Flows and room for a load. Not collective. Lives in arena. NO_MEMORY. */
 remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, const rm_load *load, rm_admission *admission);
 /* got, [givers of the rows][width], is what pack, of the giving cells, has brought: both are scaled. Collective. */
 void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing, double *pack,

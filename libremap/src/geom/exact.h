@@ -33,16 +33,21 @@ void rm_int_from_double(rm_int *r, double x, int scale);
 /* *r = (x - y) 2^scale, likewise. */
 void rm_int_from_difference(rm_int *r, double x, double y, int scale);
 
-/* *r = a + b, a - b: r may be an operand. */
+/* *r = a + b: r may be an operand. */
 void rm_int_add(rm_int *r, const rm_int *a, const rm_int *b);
+
+/* *r = a - b: r may be an operand. */
 void rm_int_sub(rm_int *r, const rm_int *a, const rm_int *b);
 
 /* *r = a b: r must not be an operand. */
 void rm_int_mul(rm_int *r, const rm_int *a, const rm_int *b);
 
-/* *r = a b - c d and *r = u . v: r must not be an operand. */
+/* *r = a b - c d: r must not be an operand. */
 void rm_int_minor(rm_int *r, const rm_int *a, const rm_int *b, const rm_int *c, const rm_int *d);
+
+/* *r = u . v: r must not be an operand. */
 void rm_int_dot(rm_int *r, const rm_int u[3], const rm_int v[3]);
+
 /* out = u x v: out must not overlap an operand. */
 void rm_int_cross(rm_int out[3], const rm_int u[3], const rm_int v[3]);
 

@@ -47,10 +47,11 @@ typedef struct rm_mesh {
  * counts: they are checked here before anything is read (NULL arrays, negative counts, offsets that do not ascend). */
 remap_status rm_frame_build(const rm_comm *comm, const remap_mesh mesh[2], rm_frame *out, rm_reason *reason);
 
-/* The same in two steps, for meshes of which one moves: the extent of each, -min x, y, z, max x, y, z over all ranks in the
- * caller's unit, all -INFINITY without nodes (collective); and the frame of both extents (not collective). */
+/* The same in two steps, for meshes of which one moves. First the extent of each: -min x, y, z, max x, y, z over all ranks in
+ * the caller's unit, all -INFINITY without nodes. Collective. */
 remap_status rm_frame_extent(const rm_comm *comm, remap_side side, const remap_mesh *given, double extent[6],
                              rm_reason *reason);
+/* Then the frame of both extents. Not collective. */
 void rm_frame_of(const double extent[2][6], rm_frame *out);
 
 /* Check and convert one mesh. Collective. Volumes and centroids depend on coordinates alone, not on numbering. Only nodes that

@@ -185,9 +185,9 @@ bool rm_moments_has_area(const work *w, rm_lid i, const slot *s, const polygon *
 /* Triangles of the meshes lie in one plane exactly; a triangle without area lies in every plane. */
 bool rm_moments_coplanar(const work *w, int mesh_a, rm_lid a, int mesh_b, rm_lid b);
 
-/* Exact sign of the component of a triangle's normal along an axis; an axis along which it is not 0, mostly the longest, or
- * -1. */
+/* Exact sign of the component of a triangle's normal along an axis. */
 int rm_moments_normal_sign(const rm_trimesh *m, rm_lid t, int axis);
+/* An axis along which it is not 0, mostly the longest component's; -1: the triangle has no area. */
 int rm_moments_axis(const rm_trimesh *m, rm_lid t);
 
 /* Put a polygon's sides where they are in the limit, and leave out those that come to nothing there. */

@@ -16,6 +16,7 @@ typedef struct rm_states {
 
 /* Start empty. NO_MEMORY. The caller owns what is inside: rm_states_free. */
 remap_status rm_states_init(rm_states *states);
+/* Give back what is inside. */
 void rm_states_free(rm_states *states);
 
 /* The state in which cell's number has changed by `by`; cell RM_OUTSIDE changes nothing. Short lists, so linear time. */

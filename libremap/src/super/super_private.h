@@ -47,16 +47,28 @@ typedef struct rm_soup {
   rm_soup_cell   *cell;       /* [num_cells] */
 } rm_soup;
 
+/* Give all of it back. Not collective, nor are the others. */
 void rm_soup_free(rm_soup *soup);
+
 /* Give back vertices and corners. */
 void rm_soup_drop_vertices(rm_soup *soup);
+
 /* Room for so much more, and no more than that. NO_MEMORY. */
 remap_status rm_soup_reserve(rm_soup *soup, int64_t vertices, int64_t faces, int64_t loop, int64_t cells);
-/* Add a vertex that is a corner, a face from the last num vertices of the loop, all at the end. NO_MEMORY, TOO_LARGE. */
+
+/* Add a corner of a given cell, and the vertex that it is: *vertex is its number. NO_MEMORY, TOO_LARGE. */
 remap_status rm_soup_add_corner(rm_soup *soup, const double xyz[3], rm_lid *vertex);
+
+/* Add a vertex to the loop of the face that is being made. NO_MEMORY. */
 remap_status rm_soup_add_to_loop(rm_soup *soup, rm_lid vertex);
+
+/* Add the face whose loop is what rm_soup_add_to_loop added since the last one; its `first` is set here. NO_MEMORY,
+ * TOO_LARGE. */
 remap_status rm_soup_end_face(rm_soup *soup, rm_soup_face face);
+
+/* Add a cell; faces name it by its number, soup->num_cells before. NO_MEMORY, TOO_LARGE. */
 remap_status rm_soup_add_cell(rm_soup *soup, rm_soup_cell cell);
+
 /* Add what room cells made. Not collective. */
 remap_status rm_soup_add_cells(rm_soup *soup, const rm_part *part, const rm_trimesh *const mesh[2], const rm_cells *cells);
 
