@@ -462,68 +462,90 @@ static void blocks_with_indices_of_any_kind_make_the_same_bits_as_one_mesh(void)
 static bool gives(int64_t global) { return global % 5 != 2 && global % 7 != 3; }
 static bool wants(int64_t global) { return global % 3 != 1; }
 
+/* Set masks [side][cells]; what does not give holds a NaN, for nobody looks. */
+static void set_masks(world *w, uint8_t *mask[2])
+{
+  remap_masks masks = {.gives = {NULL, NULL}};
+
+  for (int side = 0; side < 2; side++) {
+    mask[side] = tm_alloc_(w->cells[side], 1);
+    for (int64_t c = 0; c < w->cells[side]; c++)
+      mask[side][c] = side ? wants(w->mine[1]->global[c]) : gives(w->mine[0]->global[c]);
+  }
+  for (int64_t c = 0; c < w->cells[0]; c++)
+    if (!mask[0][c]) w->u[0][c] = NAN;
+  masks.gives[0] = mask[0], masks.wants[1] = mask[1];
+  RT_EQ(remap_set_masks(w->ctx, &masks), REMAP_OK);
+}
+
+/* A context whose source is without the cells that do not give; *rest is this rank's part of that. */
+static remap_context *open_rest(const world *w, tm_mesh **rest)
+{
+  remap_context *ctx  = NULL;
+  int           *deal = tm_deal(w->whole[0], rt_size(), TM_RANDOM, 19);
+
+  for (int64_t c = 0; c < w->whole[0]->view.num_cells; c++)
+    if (!gives(w->whole[0]->global[c])) deal[c] = -1;
+  *rest = tm_part(w->whole[0], deal, rt_rank(), 19);
+  free(deal);
+  RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &ctx), REMAP_OK);
+  RT_EQ(remap_set_mesh(ctx, 0, &(*rest)->view), REMAP_OK);
+  RT_EQ(remap_set_mesh(ctx, 1, &w->mine[1]->view), REMAP_OK);
+  RT_EQ(remap_build(ctx), REMAP_OK);
+  return ctx;
+}
+
+/* Wanting cells got what they get without the cells that do not give, the others nothing; coverage and the list of uncovered
+ * cells say so. */
+static void check_wanting(const world *w, remap_context *without, const uint8_t *wanting, const double *got, const double *want)
+{
+  remap_cover *masked = tm_alloc_(w->cells[1], sizeof *masked), *plain = tm_alloc_(w->cells[1], sizeof *plain);
+  int64_t      num, list[1000], found = 0;
+
+  RT_EQ(remap_coverage(w->ctx, 1, NULL, masked), REMAP_OK);
+  RT_EQ(remap_coverage(without, 1, NULL, plain), REMAP_OK);
+  RT_EQ(remap_uncovered(w->ctx, REMAP_TARGET, &num, NULL), REMAP_OK);
+  RT_EQ(remap_uncovered(w->ctx, REMAP_TARGET, &num, list), REMAP_OK);
+  for (int64_t c = 0; c < w->cells[1]; c++) {
+    RT_NEAR(got[c], wanting[c] ? want[c] : -7, 0.0);
+    RT_EQ(masked[c], wanting[c] ? plain[c] : REMAP_UNWANTED);
+    if (masked[c] == REMAP_UNCOVERED) RT_CHECK(found < num && list[found++] == c);
+  }
+  RT_EQ(found, num);
+  free(masked), free(plain);
+}
+
 /* The source without the cells that do not give is another mesh; with it, wanting cells get the same bits. */
 static void masked_cells_are_as_good_as_not_there(void)
 {
-  world w, without;
+  world w;
 
   if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_RANDOM, 19)) {
-    uint8_t     *mask[2];
-    remap_masks  masks = {.gives = {NULL, NULL}};
-    double      *got = tm_alloc_(w.cells[1], sizeof *got), *want = tm_alloc_(w.cells[1], sizeof *want);
-    remap_cover *cover[2];
-    int         *deal = tm_deal(w.whole[0], rt_size(), TM_RANDOM, 19);
+    uint8_t               *mask[2];
+    tm_mesh               *rest;
+    double                *got = tm_alloc_(w.cells[1], sizeof *got), *want = tm_alloc_(w.cells[1], sizeof *want), *u;
+    remap_context         *without = open_rest(&w, &rest);
+    const remap_field_desc f       = {.nature = REMAP_CONSERVED, .in = w.u[0], .out = got};
+    remap_field_desc       plain   = {.nature = REMAP_CONSERVED, .out = want};
+    remap_transfer         how     = nearest();
+    remap_field_report     report;
 
-    for (int side = 0; side < 2; side++) {
-      mask[side] = tm_alloc_(w.cells[side], 1), cover[side] = tm_alloc_(w.cells[1], sizeof(remap_cover));
-      for (int64_t c = 0; c < w.cells[side]; c++)
-        mask[side][c] = side ? wants(w.mine[1]->global[c]) : gives(w.mine[0]->global[c]);
-    }
-    for (int64_t c = 0; c < w.cells[0]; c++)
-      if (!mask[0][c]) w.u[0][c] = NAN; /* nobody looks */
-    for (int64_t c = 0; c < w.cells[1]; c++) got[c] = -7;
-    masks.gives[0] = mask[0], masks.wants[1] = mask[1];
-    RT_EQ(remap_set_masks(w.ctx, &masks), REMAP_OK);
-
-    memset(&without, 0, sizeof without);
-    RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &without.ctx), REMAP_OK);
-    for (int64_t c = 0; c < w.whole[0]->view.num_cells; c++)
-      if (!gives(w.whole[0]->global[c])) deal[c] = -1;
-    tm_mesh *rest = tm_part(w.whole[0], deal, rt_rank(), 19);
-    double  *u    = tm_alloc_(rest->view.num_cells, sizeof *u);
+    set_masks(&w, mask);
+    plain.in = u = tm_alloc_(rest->view.num_cells, sizeof *u);
     for (int64_t c = 0; c < rest->view.num_cells; c++) u[c] = lot(rest->global[c]);
-    RT_EQ(remap_set_mesh(without.ctx, 0, &rest->view), REMAP_OK);
-    RT_EQ(remap_set_mesh(without.ctx, 1, &w.mine[1]->view), REMAP_OK);
-    if (rt_all(RT_EQ(remap_build(without.ctx), REMAP_OK))) {
-      remap_transfer         how   = nearest();
-      const remap_field_desc f     = {.nature = REMAP_CONSERVED, .in = w.u[0], .out = got};
-      const remap_field_desc plain = {.nature = REMAP_CONSERVED, .in = u, .out = want};
-      remap_field_report     report;
-      int64_t                num, list[1000], found = 0;
-
-      how.on_uncovered = REMAP_UNCOVERED_FILL, how.fill_value = 5;
-      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, &report), REMAP_OK);
-      RT_NEAR(report.conservation_error, 0.0, 1e-14);
-      RT_EQ(remap_field(without.ctx, REMAP_FORWARD, &how, 1, &plain, NULL), REMAP_OK);
-      RT_EQ(remap_coverage(w.ctx, 1, NULL, cover[0]), REMAP_OK);
-      RT_EQ(remap_coverage(without.ctx, 1, NULL, cover[1]), REMAP_OK);
-      RT_EQ(remap_uncovered(w.ctx, REMAP_TARGET, &num, NULL), REMAP_OK);
-      RT_EQ(remap_uncovered(w.ctx, REMAP_TARGET, &num, list), REMAP_OK);
-      for (int64_t c = 0; c < w.cells[1]; c++) {
-        RT_NEAR(got[c], mask[1][c] ? want[c] : -7, 0.0);
-        RT_EQ(cover[0][c], mask[1][c] ? cover[1][c] : REMAP_UNWANTED);
-        if (cover[0][c] == REMAP_UNCOVERED) RT_CHECK(found < num && list[found++] == c);
-      }
-      RT_EQ(found, num);
-      how.on_uncovered = REMAP_UNCOVERED_NEAREST;
-      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
-      for (int64_t c = 0; c < w.cells[1]; c++) RT_CHECK(mask[1][c] ? got[c] >= 1 && got[c] <= 2 : got[c] == -7);
-      RT_EQ(remap_set_masks(w.ctx, NULL), REMAP_OK);
-      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, &report), REMAP_BAD_VALUE); /* now they count */
-    }
-    remap_destroy(&without.ctx);
-    for (int side = 0; side < 2; side++) free(mask[side]), free(cover[side]);
-    tm_free(rest), free(u), free(got), free(want), free(deal);
+    for (int64_t c = 0; c < w.cells[1]; c++) got[c] = -7;
+    how.on_uncovered = REMAP_UNCOVERED_FILL, how.fill_value = 5;
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, &report), REMAP_OK);
+    RT_NEAR(report.conservation_error, 0.0, 1e-14);
+    RT_EQ(remap_field(without, REMAP_FORWARD, &how, 1, &plain, NULL), REMAP_OK);
+    check_wanting(&w, without, mask[1], got, want);
+    how.on_uncovered = REMAP_UNCOVERED_NEAREST;
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
+    for (int64_t c = 0; c < w.cells[1]; c++) RT_CHECK(mask[1][c] ? got[c] >= 1 && got[c] <= 2 : got[c] == -7);
+    RT_EQ(remap_set_masks(w.ctx, NULL), REMAP_OK);
+    RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, &report), REMAP_BAD_VALUE); /* now they count */
+    remap_destroy(&without);
+    tm_free(rest), free(u), free(got), free(want), free(mask[0]), free(mask[1]);
   }
   close_world(&w);
 }
