@@ -75,8 +75,8 @@ function(remap_bench thing)
 endfunction()
 
 # remap_fuzz(<thing> COUNT <inputs> [RANKS 1 2 ...] [LIBS <targets>]): tests/fuzz/fuzz_<thing>.c as the program fuzz_<thing>.
-# CTest lets it take every file of tests/fuzz/corpus/<thing> and so many inputs drawn by lot; with REMAP_FUZZERS it is run by
-# hand.
+# CTest lets it take every file of tests/fuzz/corpus/<thing> and so many inputs drawn by lot, with sanitizers two in five of
+# these; with REMAP_FUZZERS it is run by hand.
 function(remap_fuzz thing)
   cmake_parse_arguments(PARSE_ARGV 1 T "" "COUNT" "RANKS;LIBS")
   add_executable(fuzz_${thing} fuzz/fuzz_${thing}.c)
@@ -85,6 +85,9 @@ function(remap_fuzz thing)
     target_compile_definitions(fuzz_${thing} PRIVATE REMAP_LIBFUZZER)
     target_link_options(fuzz_${thing} PRIVATE -fsanitize=fuzzer)
   else()
+    if(REMAP_SANITIZE)
+      math(EXPR T_COUNT "2 * ${T_COUNT} / 5")
+    endif()
     remap_mpi_test(fuzz ${thing} fuzz_${thing} RANKS ${T_RANKS} TIMEOUT 1000
       ARGS ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${thing} ${T_COUNT})
   endif()
