@@ -1,4 +1,5 @@
 /* Arena, growing arrays, saturating counts. */
+#include <stdlib.h>
 #include "base/base.h"
 #include "rt.h"
 
@@ -50,6 +51,22 @@ static void zeroed_memory_is_zero(void)
     for (int64_t k = 0; k < sizes[i]; k++) zeros += x[k] == 0;
     RT_EQ(zeros, sizes[i]);
   }
+  rm_arena_drop(arena);
+}
+
+/* Whether it frees them, once, the sanitizers see. */
+static void adopted_memory_is_the_arenas(void)
+{
+  rm_arena    *arena  = rm_arena_new();
+  const size_t before = rm_arena_bytes(arena);
+  double      *kept   = malloc(1000 * sizeof *kept), *left = malloc(sizeof *left);
+
+  RT_EQ(rm_arena_adopt(arena, kept, 1000 * sizeof *kept), REMAP_OK);
+  RT_CHECK(rm_arena_bytes(arena) - before >= 8000);
+  kept[999] = 1;
+  rm_arena_fail_at(arena, 1);
+  RT_EQ(rm_arena_adopt(arena, left, sizeof *left), REMAP_NO_MEMORY);
+  free(left);
   rm_arena_drop(arena);
 }
 
@@ -156,5 +173,6 @@ static void counts_saturate(void)
 }
 
 RT_MAIN(RT_CASE(allocations_are_aligned_and_do_not_touch), RT_CASE(bytes_cover_what_was_asked), RT_CASE(zeroed_memory_is_zero),
-        RT_CASE(impossible_sizes_give_null), RT_CASE(the_chosen_allocation_fails), RT_CASE(nothing_can_be_dropped),
-        RT_CASE(an_array_grows_and_keeps_its_content), RT_CASE(an_array_that_cannot_grow_stays), RT_CASE(counts_saturate))
+        RT_CASE(adopted_memory_is_the_arenas), RT_CASE(impossible_sizes_give_null), RT_CASE(the_chosen_allocation_fails),
+        RT_CASE(nothing_can_be_dropped), RT_CASE(an_array_grows_and_keeps_its_content),
+        RT_CASE(an_array_that_cannot_grow_stays), RT_CASE(counts_saturate))

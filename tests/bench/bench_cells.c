@@ -9,24 +9,9 @@
  *   bench_cells cut LEVEL [REPEATS]               one such surface in a grid of 32 x 40 x 23 boxes */
 #include <mpi.h>
 #include <stdio.h>
-#include <sys/resource.h>
-#include <time.h>
 #include "cells/cells.h"
+#include "bench.h"
 #include "laid.h"
-
-static double cpu_seconds(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static double peak_bytes(void)
-{
-  struct rusage use;
-  getrusage(RUSAGE_SELF, &use);
-  return 1024.0 * (double)use.ru_maxrss;
-}
 
 /* ---- closed surfaces --------------------------------------------------------------------------------------------- */
 
@@ -109,19 +94,19 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
   const rm_cells_choice all = {.keep = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET};
   laid        *l       = lay(source, target, faces);
   double       overlay = INFINITY, build = INFINITY;
-  const double before  = peak_bytes();
+  const double held    = bench_heap_start();
 
   if (l->status != REMAP_OK) fprintf(stderr, "%s\n", l->reason.text), exit(1);
   for (int r = 0; r < repeats; r++) {
     rm_arena         *arena = rm_arena_new(), *passing = rm_arena_new();
     const rm_overlay *o     = NULL;
     const rm_cells   *cells = NULL;
-    const double      t0    = cpu_seconds();
+    const double      t0    = bench_cpu();
     remap_status      status = rm_overlay_build(passing, l->mesh, &l->part, NULL, &o, &l->reason);
-    const double      t1     = cpu_seconds();
+    const double      t1     = bench_cpu();
 
     if (status == REMAP_OK) status = rm_cells_build(arena, &l->part, o, &passing, &all, &cells, &l->reason);
-    const double t2 = cpu_seconds();
+    const double t2 = bench_cpu();
     if (status != REMAP_OK) fprintf(stderr, "%d %s\n", (int)status, l->reason.text), exit(1);
     overlay = fmin(overlay, t1 - t0);
     build   = fmin(build, t2 - t1);
@@ -132,7 +117,7 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
              name, l->mesh[0]->num_cells, l->mesh[1]->num_cells, l->mesh[0]->num_triangles, l->mesh[1]->num_triangles,
              cells->num_cells, cells->num_faces, cells->num_vertices, overlay, build,
              1e6 * (overlay + build) / cells->num_cells, (double)rm_arena_bytes(arena) / cells->num_cells,
-             (peak_bytes() - before) / cells->num_cells);
+             (bench_heap_peak() - held) / cells->num_cells);
     rm_arena_drop(arena);
     rm_arena_drop(passing);
   }
@@ -161,14 +146,14 @@ static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int kee
     remap_set_mesh(ctx, side, &mine[side]->view);
     tm_free(whole[side]), free(deal);
   }
-  const double before = peak_bytes(), t0 = cpu_seconds();
+  const double held = bench_heap_start(), t0 = bench_cpu();
   if (remap_supermesh(ctx, &all, &v) != REMAP_OK) fprintf(stderr, "%s\n", remap_message(ctx)), exit(1);
-  const double t1 = cpu_seconds();
+  const double t1 = bench_cpu();
   printf("{\"bench\":\"supermesh\",\"rank\":%d,\"ranks\":%d,\"maph\":%lld,\"maph_here\":%lld,\"faces\":%lld,\"nodes\":%lld,"
          "\"us_per_maph\":%.2f,\"bytes_peak_per_maph\":%.0f,\"s_partition\":%.3f,\"s_triangulation\":%.3f,\"s_crossings\":%.3f,"
          "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f}\n",
          rank, size, (long long)v.global_cells, (long long)v.num_cells, (long long)v.num_faces, (long long)v.num_nodes,
-         1e6 * (t1 - t0) / (double)v.num_cells, (peak_bytes() - before) / (double)v.num_cells, v.seconds_partition,
+         1e6 * (t1 - t0) / (double)v.num_cells, (bench_heap_peak() - held) / (double)v.num_cells, v.seconds_partition,
          v.seconds_triangulation, v.seconds_crossings, v.seconds_polygons, v.seconds_cells, v.seconds_faces,
          v.seconds_numbering, t1 - t0);
   remap_destroy(&ctx);

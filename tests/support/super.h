@@ -89,7 +89,7 @@ static inline void super_faces_are_covered_(const super *s)
     double           *sum = tm_alloc_(n, sizeof *sum), *area = tm_alloc_(n, sizeof *area), worst = 0;
 
     for (rm_lid f = 0; f < s->cells->num_faces; f++) {
-      const rm_lid t = s->cells->face_triangle[f][side];
+      const rm_lid t = rm_cells_triangle(s->cells, f, side);
       double       a[3];
       super_area_vector_(s->cells, f, a);
       if (t >= 0) sum[rm_face_of_triangle(m, t)] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);

@@ -17,8 +17,15 @@ typedef struct block {
   struct block *next;
 } block;
 
+/* Memory that came from elsewhere. */
+typedef struct adopted {
+  struct adopted *next;
+  void           *data;
+} adopted;
+
 struct rm_arena {
-  block  *first;      /* all blocks, newest first; NULL if none */
+  block   *first;     /* all blocks, newest first; NULL if none */
+  adopted *adopted;   /* in one of the blocks each              */
   char   *free;       /* next free byte of the newest shared block */
   size_t  free_bytes; /* multiple of ALIGN */
   size_t  bytes;      /* taken from the system */
@@ -38,6 +45,7 @@ void rm_arena_drop(rm_arena *arena)
   block *next;
 
   if (!arena) return;
+  for (adopted *a = arena->adopted; a; a = a->next) free(a->data);
   for (block *b = arena->first; b; b = next) {
     next = b->next;
     free(b);
@@ -101,6 +109,17 @@ void *rm_arena_zero(rm_arena *arena, int64_t count, size_t size)
 
   if (memory) memset(memory, 0, (size_t)count * size);
   return memory;
+}
+
+remap_status rm_arena_adopt(rm_arena *arena, void *data, size_t bytes)
+{
+  adopted *a = rm_arena_alloc(arena, 1, sizeof *a);
+
+  if (!a) return REMAP_NO_MEMORY;
+  *a = (adopted){arena->adopted, data};
+  arena->adopted = a;
+  arena->bytes += bytes;
+  return REMAP_OK;
 }
 
 size_t rm_arena_bytes(const rm_arena *arena) { return arena->bytes; }

@@ -57,6 +57,8 @@ void rm_arena_drop(rm_arena *arena);
 void *rm_arena_alloc(rm_arena *arena, int64_t count, size_t size);
 /* The same, cleared to zero. */
 void *rm_arena_zero(rm_arena *arena, int64_t count, size_t size);
+/* Hand malloc'ed memory of `bytes` over to the arena, which frees it with all else. NO_MEMORY: it stays the caller's. */
+remap_status rm_arena_adopt(rm_arena *arena, void *data, size_t bytes);
 /* Bytes in use. */
 size_t rm_arena_bytes(const rm_arena *arena);
 /* ptr = RM_NEW(arena, count, type): returns NO_MEMORY from the calling function if there is none. Only where nothing is

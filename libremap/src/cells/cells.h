@@ -21,12 +21,17 @@ typedef struct rm_cells_choice {
   bool           split_concave; /* concave polygons are cut into convex ones                                              */
 } rm_cells_choice;
 
-/* Where a point lies in one of the meshes: on a vertex, inside an edge or triangle, or anywhere else. */
+/* Where a point lies in one of the meshes: on a vertex, inside an edge or triangle, or anywhere else (id is 0 then). There are
+ * less than 2^30 of each. */
 typedef enum rm_kind { RM_ON_VERTEX, RM_ON_EDGE, RM_ON_TRIANGLE, RM_ON_NOTHING } rm_kind;
 typedef struct rm_feature {
-  rm_kind kind;
-  rm_lid  id;
+  uint32_t kind : 2; /* rm_kind */
+  uint32_t id : 30;
 } rm_feature;
+static inline rm_feature rm_feature_of(rm_kind kind, rm_lid id)
+{
+  return (rm_feature){(uint32_t)kind & 3, (uint32_t)id & 0x3fffffff};
+}
 
 /* A vertex of the supermesh: a vertex of one mesh, or an edge of one with an edge or a triangle of the other. */
 typedef struct rm_spot {
@@ -39,19 +44,33 @@ typedef struct rm_spot {
  *   cells are closed and their exact volumes positive (what rounding leaves of a sliver may not be);
  *   cells, faces and vertices are in an order that depends on coordinates alone. */
 typedef struct rm_cells {
-  rm_lid         num_vertices, num_faces, num_cells;
-  const double (*vertex)[3];        /* [num_vertices] mesh room's frame                                                       */
-  const rm_spot *vertex_spot;       /* [num_vertices] what it is                                                              */
-  const int64_t *face_offset;       /* [num_faces + 1]                                                                        */
-  const rm_lid  *face_vertex;       /* [face_offset[num_faces]] loops                                                         */
-  const rm_lid (*face_cell)[2];     /* [num_faces] owner, neighbour or RM_OUTSIDE                                             */
-  const rm_lid (*face_beyond)[2];   /* [num_faces] ancestors of what is behind a face without neighbour                       */
-  const rm_lid (*face_triangle)[2]; /* [num_faces] triangle of mesh 1 and of mesh 2 it lies in, -1 (of several: the first)    */
-  const rm_lid (*cell_ancestor)[2]; /* [num_cells] cells of part->piece[0] and [1], RM_OUTSIDE                                */
-  const double  *cell_volume;       /* [num_cells] of the exact cell, not of its rounded vertices                             */
-  int64_t        num_polygons;      /* before pieces of a face were put together                                              */
-  double         seconds_polygons, seconds_glue, seconds_faces;
+  rm_lid          num_vertices, num_faces, num_cells, num_beyond, num_shared;
+  const double  (*vertex)[3];        /* [num_vertices] mesh room's frame                                                     */
+  const rm_spot  *vertex_spot;       /* [num_vertices] what it is                                                            */
+  const uint32_t *face_offset;       /* [num_faces + 1]                                                                      */
+  const rm_lid   *face_vertex;       /* [face_offset[num_faces]] loops                                                       */
+  const rm_lid  (*face_cell)[2];     /* [num_faces] owner; neighbour, RM_OUTSIDE, or -2 - k where beyond[k] was not kept      */
+  const rm_lid   *face_own;          /* [num_faces] 2 * triangle + its mesh where it lies in one; or -1 - k: in shared[k]    */
+  const rm_lid  (*beyond)[2];        /* [num_beyond] ancestors of the cell behind a face which is not of the result          */
+  const rm_lid  (*shared)[2];        /* [num_shared] triangle of mesh 1 and of mesh 2 that a face lies in                    */
+  const rm_lid  (*cell_ancestor)[2]; /* [num_cells] cells of part->piece[0] and [1], RM_OUTSIDE                              */
+  const double   *cell_volume;       /* [num_cells] of the exact cell, not of its rounded vertices                           */
+  int64_t         num_polygons;      /* before pieces of a face were put together                                            */
+  double          seconds_polygons, seconds_glue, seconds_faces;
 } rm_cells;
+
+/* The triangle of mesh `side` that face f lies in (of several: the first), -1. */
+static inline rm_lid rm_cells_triangle(const rm_cells *cells, rm_lid f, int side)
+{
+  const rm_lid own = cells->face_own[f];
+  return own < 0 ? cells->shared[-1 - own][side] : (own & 1) == side ? own / 2 : -1;
+}
+
+/* Ancestors of what is behind face f, if that is a cell which was not kept, else NULL. */
+static inline const rm_lid *rm_cells_beyond(const rm_cells *cells, rm_lid f)
+{
+  return cells->face_cell[f][1] < RM_OUTSIDE ? cells->beyond[-2 - cells->face_cell[f][1]] : NULL;
+}
 
 /* False if the corners of triangle t are on a line. Exact. Not collective. */
 bool rm_has_area(const rm_trimesh *m, rm_lid t);
@@ -61,11 +80,12 @@ bool rm_has_area(const rm_trimesh *m, rm_lid t);
  * if it has none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */
 remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out);
 
-/* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they
- * are coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena.
- * BAD_MESH with the reason if cells of one mesh overlap or cross each other. The meshes of the overlay have no flat
- * triangles: see rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but not its meshes: it is
- * dropped, and NULL then, as soon as it is used up. O(n log n) in crossings, n^2 in the vertices of a face with holes. */
+/* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
+ * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH
+ * with the cell and the reason if cells of one mesh overlap or cross each other; TOO_LARGE from 2^30 polygons on. The meshes
+ * of the overlay have no flat triangles: see rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but
+ * not its meshes: it is dropped, and NULL then, as soon as it is used up. O(n log n) in crossings, n^2 in the vertices of a
+ * face with holes. */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason);
 

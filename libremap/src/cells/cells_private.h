@@ -17,29 +17,45 @@
 
 enum { RM_UNKNOWN = INT32_MAX }; /* no state yet */
 
+/* What the polygons on one mesh are made from. */
+typedef struct rm_lines {
+  const rm_lid *offset;       /* [num_edges + 1]                                                                       */
+  const rm_lid *spot, *state; /* spots inside an edge from its first vertex on; state in the other mesh behind each,
+                                 where it is in a cell                                                                 */
+  const rm_lid *start;        /* [num_edges] state behind the edge's first vertex                                      */
+  const rm_lid *inner_offset; /* [num_triangles + 1]                                                                   */
+  const rm_lid *inner_spot;   /* vertices of the other mesh inside the triangle                                        */
+} rm_lines;
+
+/* A segment as one triangle sees it: from p to q the other triangle's left cell is on the left. */
+typedef struct rm_segment {
+  rm_lid other, p, q;
+} rm_segment;
+
 /* The limit of the overlay. Triangles of a mesh that lie on each other count as the first of them, with the sides that are left
  * when cells on both sides of the stack cancel. A triangle whose sides all cancel is absent. */
 typedef struct rm_limit {
-  const rm_overlay *o;
-  const rm_lid     *first_copy[2];   /* [side][num_triangles]                                                  */
+  const rm_trimesh *mesh[2];
+  const rm_lid     *first_copy[2];   /* [side][num_triangles]                                                   */
   const rm_lid    (*cell[2])[2];     /* [side][num_triangles] net left and right cell; equal where it is absent */
   rm_lid            num_spots;
-  const rm_spot    *spot;            /* [num_spots] those of mesh 1's vertices, of mesh 2's, of crossings      */
-  const double    (*xyz)[3];         /* [num_spots] rounded                                                    */
-  const float     (*low)[3];         /* [num_spots] what rounding took from xyz: volumes far from the origin need it */
+  rm_spot          *spot;            /* [num_spots] those of mesh 1's vertices, of mesh 2's, of crossings      */
+  double          (*xyz)[3];         /* [num_spots] rounded                                                    */
   const float      *error;           /* [num_spots] bound of the error of each coordinate                      */
   const rm_lid     *vertex_spot[2];  /* [side][num_vertices]                                                   */
-  const rm_lid     *crossing_spot[2]; /* [side][crossings of its edges]                                        */
-  const int64_t    *line_offset[2];  /* [side][num_edges + 1]                                                  */
-  const rm_lid     *line_spot[2];    /* spots along an edge from its first vertex to its second                */
-  const rm_lid     *line_state[2];   /* [same] state in the other mesh behind the spot, where it is in a cell  */
-  const int64_t    *inner_offset[2]; /* [side][num_triangles + 1]                                              */
-  const rm_lid     *inner_spot[2];   /* vertices of the other mesh inside the triangle                         */
+  rm_lines          lines[2];        /* [side] until the polygons are made                                     */
+  const rm_lid     *segment_offset;  /* [triangles of mesh 1 + 1] likewise                                     */
+  const rm_segment *segment;         /* of triangles of mesh 1                                                 */
 } rm_limit;
 
-/* Lives in arena, but for what only polygons are made from, which lives in passing: crossing_spot, lines, inner. BAD_MESH
- * with the reason where cells overlap. */
-remap_status rm_limit_build(rm_arena *arena, rm_arena *passing, const rm_part *part, const rm_overlay *o, const rm_limit **out,
+/* Where it lives: spot and xyz, which are the result's; what polygons of either mesh are made from, with the segments in the
+ * first; all else. The overlay's is dropped, and NULL then, as soon as it is used up; NULL if it is the caller's. */
+typedef struct rm_limit_home {
+  rm_arena *spots, *lines[2], *rest, **overlay;
+} rm_limit_home;
+
+/* Its meshes are those of the overlay, which it uses up. BAD_MESH with cell and reason where cells overlap. O(n) expected. */
+remap_status rm_limit_build(const rm_limit_home *home, const rm_part *part, const rm_overlay *o, const rm_limit **out,
                             rm_reason *reason);
 
 static inline bool rm_is_present(const rm_limit *l, int side, rm_lid t)
@@ -51,12 +67,12 @@ static inline bool rm_is_present(const rm_limit *l, int side, rm_lid t)
 static inline bool rm_on_edge(const rm_limit *l, int side, rm_lid p, rm_lid e)
 {
   const rm_feature f    = l->spot[p].at[side];
-  const rm_lid    *edge = l->o->mesh[side]->edge[e];
+  const rm_lid    *edge = l->mesh[side]->edge[e];
   return f.kind == RM_ON_EDGE ? f.id == e : f.kind == RM_ON_VERTEX && (f.id == edge[0] || f.id == edge[1]);
 }
 static inline bool rm_in_triangle(const rm_limit *l, int side, rm_feature f, rm_lid t)
 {
-  const rm_trimesh *m = l->o->mesh[side];
+  const rm_trimesh *m = l->mesh[side];
   const rm_lid     *x = f.kind == RM_ON_VERTEX ? m->triangle[t] : m->triangle_edge[t];
 
   if (f.kind == RM_ON_NOTHING) return false;
@@ -71,11 +87,17 @@ bool rm_off_plane(const double a[3], const double b[3], const double c[3], doubl
 
 /* The spot as the meeting of a line and a plane: ends of the line, three points of the plane; false if it is a vertex, then
  * line[0] is that. */
-bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3]);
+bool rm_spot_meeting(const rm_limit *l, const rm_spot *spot, double line[2][3], double plane[3][3]);
 
 /* For a spot inside an edge of mesh `side`: three points of a plane, not along that edge, in which the other mesh has the
  * spot. */
-void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double plane[3][3]);
+void rm_spot_plane(const rm_limit *l, const rm_spot *spot, int side, double plane[3][3]);
+
+/* xyz and error of all spots. NO_MEMORY. */
+remap_status rm_spot_coordinates(const rm_limit_home *home, rm_limit *l);
+/* What rounding took from xyz, (*out)[num_spots], in arena: volumes far from the origin need it. It is computed once more
+ * rather than kept, for it is 12 bytes a spot. NO_MEMORY. */
+remap_status rm_spot_low(rm_arena *arena, const rm_limit *l, float (**out)[3]);
 
 /* Signs within one triangle's plane, seen from its normal's tip: projected along axis. */
 typedef struct rm_view {
@@ -96,41 +118,46 @@ typedef struct rm_label {
   rm_lid cell[2]; /* [side] RM_OUTSIDE */
 } rm_label;
 
-/* A polygon of the supermesh: its loop is counter-clockwise about the normal of its own triangle. */
-typedef struct rm_polygon {
-  int64_t first; /* vertex */
-  rm_lid  own;   /* 2 * triangle + its mesh; mesh 1 if it lies on triangles of both */
-  rm_lid  other; /* cell of the other mesh it lies in, RM_OUTSIDE, or -2 - (2 * triangle + (1 if that faces the other way)) */
-} rm_polygon;
-
-/* malloc'ed; the owner frees both arrays. */
+/* Polygons of the supermesh. malloc'ed, each array by itself; the owner frees them. Loops are counter-clockwise about the
+ * normal of their own triangle. */
 typedef struct rm_polygons {
-  rm_polygon *polygon; /* [num + 1] the last one has `first` only, unless there are none */
-  rm_lid     *vertex;  /* [num_vertices] spots */
-  int64_t     num, num_vertices, room, vertex_room;
+  uint32_t *first;  /* [num + 1] vertex                                                                                      */
+  rm_lid   *own;    /* [num] 2 * triangle + its mesh; mesh 1 if it lies on triangles of both                                 */
+  rm_lid   *other;  /* [num] cell of the other mesh it lies in, RM_OUTSIDE, or -2 - (2 * triangle + (1 if that faces the other
+                       way))                                                                                                */
+  rm_lid   *vertex; /* [num_vertices] spots                                                                                  */
+  int64_t   num, num_vertices, first_room, own_room, other_room, vertex_room;
 } rm_polygons;
 
-static inline rm_lid rm_polygon_size(const rm_polygon *g) { return (rm_lid)(g[1].first - g[0].first); }
+/* Free the arrays. */
+void rm_polygons_free(rm_polygons *p);
+/* Give back what the arrays have grown too far. */
+void rm_polygons_trim(rm_polygons *p);
 
-/* The triangle of mesh `side` it lies on, -1. */
-static inline rm_lid rm_polygon_triangle(const rm_polygon *g, int side)
+static inline rm_lid rm_polygon_size(const rm_polygons *p, int64_t k) { return (rm_lid)(p->first[k + 1] - p->first[k]); }
+static inline const rm_lid *rm_polygon_loop(const rm_polygons *p, int64_t k) { return p->vertex + p->first[k]; }
+
+/* The triangle of mesh `side` that polygon k lies on, -1. */
+static inline rm_lid rm_polygon_triangle(const rm_polygons *p, int64_t k, int side)
 {
-  return (g->own & 1) == side ? g->own / 2 : g->other < RM_OUTSIDE ? (-2 - g->other) / 2 : -1;
+  return (p->own[k] & 1) == side ? p->own[k] / 2 : p->other[k] < RM_OUTSIDE ? (-2 - p->other[k]) / 2 : -1;
 }
 
-/* Cells left (h = 0) or right (1) of it. */
-static inline rm_label rm_polygon_label(const rm_limit *l, const rm_polygon *g, int h)
+/* Cells left (h = 0) or right (1) of polygon k. */
+static inline rm_label rm_polygon_label(const rm_limit *l, const rm_polygons *p, int64_t k, int h)
 {
-  const int side = g->own & 1, code = -2 - g->other;
-  rm_label  label;
+  const rm_lid own = p->own[k], other = p->other[k], code = -2 - other;
+  const int    side = own & 1;
+  rm_label     label;
 
-  label.cell[side]     = l->cell[side][g->own / 2][h];
-  label.cell[1 - side] = g->other < RM_OUTSIDE ? l->cell[1 - side][code / 2][h ^ (code & 1)] : g->other;
+  label.cell[side]     = l->cell[side][own / 2][h];
+  label.cell[1 - side] = other < RM_OUTSIDE ? l->cell[1 - side][code / 2][h ^ (code & 1)] : other;
   return label;
 }
 
-/* Every polygon of the supermesh. BAD_MESH if the meshes are not embedded. */
-remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason);
+/* Every polygon of the supermesh. lines are the arenas of l->lines: dropped, and NULL then, one after the other. BAD_MESH with
+ * cell and reason if the meshes are not embedded, TOO_LARGE from 2^30 polygons on. O(a log a) for the arcs of a triangle. */
+remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_arena *lines[2], rm_polygons *out, rm_reason *reason);
 
 /* The region inside loop[0] and outside the others, as triangles: corner gets three spots each, *num their number. Loops are
  * offset[num_loops + 1] into spot; the first runs counter-clockwise, the others clockwise. NO_MEMORY, BAD_MESH. */
@@ -157,21 +184,19 @@ typedef struct rm_arc {
   rm_lid polygon; /* 2 * polygon + (1 if that runs from the higher vertex on) */
 } rm_arc;
 
-/* The edges of all polygons, by their lower vertex. */
-typedef struct rm_arcs {
-  rm_lid             num_vertices;
-  const rm_polygons *p;
-  const int64_t     *offset;  /* [num_vertices + 1]                                               */
-  const rm_lid      *polygon; /* ascending at each vertex: those with an edge to a higher one     */
-  rm_arc            *arc;     /* those of one vertex: what rm_arcs_at found last                  */
-} rm_arcs;
-
-/* Lives in arena. Vertices of the polygons are below num_vertices. TOO_LARGE from 2^30 polygons on. O(n). */
-remap_status rm_arcs_build(rm_arena *arena, rm_lid num_vertices, const rm_polygons *p, rm_arcs *out);
-/* How many edges have this lower vertex; they are in arcs->arc then, by their higher vertex, then by polygon. O(n log n). */
-rm_lid rm_arcs_at(const rm_arcs *arcs, rm_lid low);
+/* The n polygons at one edge, from a lower vertex on, ascending. */
+typedef remap_status rm_arc_visitor(void *user, rm_lid low, const rm_arc *arc, rm_lid n);
+/* Visit all edges of the polygons, whose vertices are below num_vertices, in order, until a visit fails. O(n) expected. */
+remap_status rm_each_edge(rm_lid num_vertices, const rm_polygons *p, rm_arc_visitor *visit, void *user);
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
+
+/* Pieces of one face between the same two cells that meet in an edge which no other polygon has. */
+typedef struct rm_joint {
+  rm_lid   polygon[2];
+  uint32_t corner[2]; /* where the edge begins in the loop of each, among all vertices */
+  bool     coplanar;
+} rm_joint;
 
 /* cell[2 k] and cell[2 k + 1] are the cells left and right of polygon k, RM_OUTSIDE; label and volume of each cell. */
 typedef struct rm_glued {
@@ -179,32 +204,37 @@ typedef struct rm_glued {
   const rm_lid   *cell;
   const rm_label *label;
   const double   *volume;
+  rm_joint       *joint; /* malloc'ed, the owner frees it */
+  int64_t         num_joints, joint_room;
 } rm_glued;
-/* Glue polygons to cells around their edges. All lives in arena. BAD_MESH if the polygons around an edge bound no cells. */
-remap_status rm_glue(rm_arena *arena, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs, rm_glued *out);
-
-/* Which polygons make one face. Its loop is counter-clockwise about the normal out of the lower cell, RM_OUTSIDE being the
- * highest. */
-typedef struct rm_faces {
-  int64_t        num;    /* groups                                                      */
-  const int64_t *offset; /* [num + 1]                                                   */
-  const rm_lid  *member; /* polygons, ascending; groups ascend by their first one       */
-  const uint8_t *inner;  /* [num_vertices of p] the edge from this place on is no side  */
-  rm_lid        *next;   /* scratch of rm_face_loop, [num_spots]                        */
-} rm_faces;
-
-/* Group pieces of one face between the same two cells: coplanar ones; if warped, all whose loop is one of a polygon that
- * some plane shows without folds, and is not that of another group all around. Lives in arena; passing is for what is not
- * kept. */
-remap_status rm_faces_build(rm_arena *arena, rm_arena *passing, const rm_limit *l, const rm_polygons *p, const rm_arcs *arcs,
-                            const rm_glued *glued, bool warped, rm_faces *out);
-/* The loop of group k, room for all its members' vertices; 0 if the group has not exactly one loop that meets itself
- * nowhere: its members then are faces as they are. */
-rm_lid rm_face_loop(const rm_faces *faces, const rm_polygons *p, const rm_glued *glued, int64_t k, rm_lid *loop);
+/* Glue polygons to cells around their edges. Lives in arena. Pieces that are not coplanar are joints only if they are wanted.
+ * BAD_MESH with cell and reason if the polygons around an edge do not bound cells. O(n log n). */
+remap_status rm_glue(rm_arena *arena, const rm_part *part, const rm_limit *l, const rm_polygons *p, bool warped, rm_glued *out,
+                     rm_reason *reason);
 /* True if polygon k has to be turned so that its normal points out of the lower cell. */
 static inline bool rm_is_turned(const rm_glued *glued, int64_t k)
 {
   return (uint32_t)glued->cell[2 * k] > (uint32_t)glued->cell[2 * k + 1];
 }
+
+/* ---- faces ------------------------------------------------------------------------------------------------------- */
+
+/* What a polygon is to the faces: none, or part of another one's; one as it is; what `made` has instead. */
+typedef enum rm_face_kind { RM_FACE_NONE, RM_FACE_ITSELF, RM_FACE_MADE } rm_face_kind;
+
+/* Faces in the order of polygons. A face that is not one of them as it is has a loop in `made`, counter-clockwise about the
+ * normal of that polygon's triangle. */
+typedef struct rm_faces {
+  uint8_t *kind;       /* [num polygons] rm_face_kind; not owned      */
+  rm_lid  *made_of;    /* [made.num] polygon, ascending; malloc'ed    */
+  int64_t  made_room;
+  rm_parts made;
+} rm_faces;
+
+/* Pieces put together, coplanar ones; if `warped`, all whose loop is one of a polygon that some plane shows without folds,
+ * and is not that of another group all around. If split_concave, concave faces are cut into convex ones. out->kind is given:
+ * NONE for polygons of no interest, ITSELF for others. The owner frees what is added to out. O(n) expected. */
+remap_status rm_faces_build(const rm_limit *l, const rm_polygons *p, const rm_glued *glued, bool warped, bool split_concave,
+                            rm_faces *out);
 
 #endif

@@ -12,9 +12,9 @@ static bool loops_are_right(const rm_cells *m, rm_lid *seen)
   for (rm_lid v = 0; v < m->num_vertices; v++) seen[v] = -1;
   for (rm_lid f = 0; f < m->num_faces; f++) {
     if (m->face_offset[f + 1] - m->face_offset[f] < 3) return false;
-    if (m->face_cell[f][0] < 0 || m->face_cell[f][0] >= m->num_cells || m->face_cell[f][1] < RM_OUTSIDE) return false;
+    if (m->face_cell[f][0] < 0 || m->face_cell[f][0] >= m->num_cells || m->face_cell[f][1] < -1 - m->num_beyond) return false;
     if (m->face_cell[f][1] >= m->num_cells || m->face_cell[f][0] == m->face_cell[f][1]) return false;
-    if (m->face_triangle[f][0] < 0 && m->face_triangle[f][1] < 0) return false;
+    if (m->face_own[f] < -m->num_shared) return false;
     for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) {
       const rm_lid v = m->face_vertex[k];
       if (v < 0 || v >= m->num_vertices || seen[v] == f) return false;

@@ -10,7 +10,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "geom/expansion.h"
 
 /* An edge of mesh 1 and one of mesh 2 that cross inside both. */
 typedef struct edge_contact {
@@ -18,14 +17,17 @@ typedef struct edge_contact {
 } edge_contact;
 
 typedef struct builder {
-  rm_arena      *arena, *passing, *scratch;
-  const rm_part *part;
+  const rm_limit_home *home;
+  rm_arena         *arena, *scratch; /* home->rest; working memory */
+  const rm_part    *part;
+  const rm_overlay *o;
   rm_limit      *l;
   rm_reason     *reason;
   const rm_boxtree *tree[2];      /* [side] over all triangles, NULL until needed */
   const double (*box[2])[6];
   uint8_t       *edge_present[2]; /* [side][num_edges] some present triangle has the edge */
   rm_feature    *at[2];           /* [side][num_vertices] where the vertex lies in the other mesh */
+  rm_lid        *crossing_spot[2]; /* [side][crossings of its edges] */
   edge_contact  *contact;         /* ascending by edge[0], then by edge[1] */
   int64_t        num_contacts, contact_room;
   rm_lid        *contact_first[2]; /* [side][num_edges + 1] */
@@ -48,7 +50,7 @@ static remap_status overlapping(const builder *b, int side, rm_lid cell)
 /* The sides of triangles first..last - 1, which lie on each other, less the cells that are on both. */
 static remap_status net_sides(const builder *b, int side, rm_lid first, rm_lid last, rm_lid net[2])
 {
-  const rm_trimesh *m = b->l->o->mesh[side];
+  const rm_trimesh *m = b->l->mesh[side];
   int               left = 0;
 
   net[0] = net[1] = RM_OUTSIDE;
@@ -68,24 +70,33 @@ static remap_status net_sides(const builder *b, int side, rm_lid first, rm_lid l
   return REMAP_OK;
 }
 
+static inline bool is_copy(const rm_trimesh *m, rm_lid t)
+{
+  return t > 0 && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle);
+}
+
 static remap_status join_copies(builder *b, int side)
 {
-  const rm_trimesh *m = b->l->o->mesh[side];
-  rm_lid           *first, (*cell)[2];
+  const rm_trimesh *m = b->l->mesh[side];
+  rm_lid           *first, (*cell)[2] = NULL, copies = 0;
 
   RM_NEW(first, b->arena, m->num_triangles);
-  RM_NEW(cell, b->arena, m->num_triangles);
   RM_NEW0(b->edge_present[side], b->scratch, m->num_edges);
+  for (rm_lid t = 0; t < m->num_triangles; t++) copies += is_copy(m, t);
+  if (copies) RM_NEW(cell, b->arena, m->num_triangles);
+  b->l->cell[side] = copies ? (const rm_lid(*)[2])cell : m->side; /* one triangle alone has its own sides */
   for (rm_lid t = 0, last; t < m->num_triangles; t = last) {
-    for (last = t + 1; last < m->num_triangles && !memcmp(m->triangle[last], m->triangle[t], sizeof *m->triangle);) last++;
-    rm_lid net[2] = {RM_OUTSIDE, RM_OUTSIDE};
+    for (last = t + 1; last < m->num_triangles && is_copy(m, last);) last++;
     RM_ASSERT(rm_has_area(m, t));
-    RM_TRY(net_sides(b, side, t, last, net));
-    for (rm_lid s = t; s < last; s++) first[s] = t, memcpy(cell[s], net, sizeof net);
-    for (int h = 0; h < 3 && net[0] != net[1]; h++) b->edge_present[side][m->triangle_edge[t][h]] = 1;
+    for (rm_lid s = t; s < last; s++) first[s] = t;
+    if (copies) {
+      RM_TRY(net_sides(b, side, t, last, cell[t]));
+      for (rm_lid s = t + 1; s < last; s++) memcpy(cell[s], cell[t], sizeof *cell);
+    }
+    for (int h = 0; h < 3 && b->l->cell[side][t][0] != b->l->cell[side][t][1]; h++)
+      b->edge_present[side][m->triangle_edge[t][h]] = 1;
   }
   b->l->first_copy[side] = first;
-  b->l->cell[side]       = (const rm_lid (*)[2])cell;
   return REMAP_OK;
 }
 
@@ -97,7 +108,7 @@ enum { LARGE = 256 };
 
 static remap_status need_tree(builder *b, int side)
 {
-  const rm_trimesh *m = b->l->o->mesh[side];
+  const rm_trimesh *m = b->l->mesh[side];
   double          (*box)[6];
 
   if (b->tree[side]) return REMAP_OK;
@@ -127,7 +138,7 @@ typedef struct vertex_query {
 static int touch_triangle(void *user, rm_lid t)
 {
   vertex_query     *q = user;
-  const rm_trimesh *m = q->l->o->mesh[q->other];
+  const rm_trimesh *m = q->l->mesh[q->other];
   const double     *v[3] = {corner(m, t, 0), corner(m, t, 1), corner(m, t, 2)};
   double            o[3];
   int               turn[3], zeros = 0;
@@ -145,14 +156,14 @@ static int touch_triangle(void *user, rm_lid t)
   }
   if (zeros == 2) {
     const int h = turn[0] ? 2 : turn[1] ? 0 : 1; /* the corner between the two sides it is on */
-    q->found = (rm_feature){RM_ON_VERTEX, m->triangle[t][h]};
+    q->found = rm_feature_of(RM_ON_VERTEX, m->triangle[t][h]);
     return 1;
   }
   if (zeros == 1) {
     const int h = !turn[0] ? 0 : !turn[1] ? 1 : 2;
-    q->found = (rm_feature){RM_ON_EDGE, m->triangle_edge[t][h]};
+    q->found = rm_feature_of(RM_ON_EDGE, m->triangle_edge[t][h]);
   } else if (q->found.kind == RM_ON_NOTHING) {
-    q->found = (rm_feature){RM_ON_TRIANGLE, t};
+    q->found = rm_feature_of(RM_ON_TRIANGLE, t);
   }
   return 0;
 }
@@ -160,7 +171,7 @@ static int touch_triangle(void *user, rm_lid t)
 static int touch_skin(void *user, rm_lid item)
 {
   const vertex_query *q = user;
-  return touch_triangle(user, q->l->o->mesh[q->other]->skin[item]);
+  return touch_triangle(user, q->l->mesh[q->other]->skin[item]);
 }
 
 /* State of a vertex in the other mesh. */
@@ -176,13 +187,13 @@ static rm_lid state_of_vertex(const rm_overlay *o, int side, rm_lid v)
 
 static remap_status place_vertices(builder *b, int side)
 {
-  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
+  const rm_trimesh *own = b->l->mesh[side], *other = b->l->mesh[1 - side];
 
   RM_NEW(b->at[side], b->scratch, own->num_vertices);
   for (rm_lid v = 0; v < own->num_vertices; v++) {
-    const rm_lid  j = state_of_vertex(b->l->o, side, v);
+    const rm_lid  j = state_of_vertex(b->o, side, v);
     const double *p = own->vertex[v], at[6] = {p[0], p[1], p[2], p[0], p[1], p[2]};
-    vertex_query  q = {b->l, 1 - side, p, {RM_ON_NOTHING, -1}};
+    vertex_query  q = {b->l, 1 - side, p, {RM_ON_NOTHING, 0}};
 
     if (j == RM_OUTSIDE) {
       rm_boxtree_query(other->skin_tree, other->skin_box, at, touch_skin, &q);
@@ -233,7 +244,7 @@ static void set_box(edge_query *q, double from, double to)
 /* Edges that are coplanar and cross inside both: each has its ends on both sides of the other. */
 static int touch_edge(edge_query *q, rm_lid f)
 {
-  const rm_trimesh *m2 = q->b->l->o->mesh[1];
+  const rm_trimesh *m2 = q->b->l->mesh[1];
   const double     *f0 = m2->vertex[m2->edge[f][0]], *f1 = m2->vertex[m2->edge[f][1]];
   double            o[3];
 
@@ -254,21 +265,21 @@ static int touch_edges_of(void *user, rm_lid t)
   edge_query *q = user;
 
   for (int h = 0; h < 3; h++)
-    if (touch_edge(q, q->b->l->o->mesh[1]->triangle_edge[t][h])) return 1;
+    if (touch_edge(q, q->b->l->mesh[1]->triangle_edge[t][h])) return 1;
   return 0;
 }
 
 static int touch_edges_of_skin(void *user, rm_lid item)
 {
   const edge_query *q = user;
-  return touch_edges_of(user, q->b->l->o->mesh[1]->skin[item]);
+  return touch_edges_of(user, q->b->l->mesh[1]->skin[item]);
 }
 
 /* Contacts of the present piece with the edges of cell j, by sides of its box that all their vertices are beyond. */
 static void touch_near(edge_query *q, rm_lid j)
 {
   static const int  low[3] = {0, 1, 0}, high[3] = {1, 2, 2};
-  const rm_trimesh *m2     = q->b->l->o->mesh[1];
+  const rm_trimesh *m2     = q->b->l->mesh[1];
   const rm_lid     *vertex = m2->cell_vertex + m2->cell_vertex_offset[j],
                n           = m2->cell_vertex_offset[j + 1] - m2->cell_vertex_offset[j];
   unsigned          code[256]; /* places in a cell are bytes */
@@ -287,7 +298,7 @@ static void touch_near(edge_query *q, rm_lid j)
 static remap_status touch_cell(edge_query *q, rm_lid j)
 {
   builder          *b  = q->b;
-  const rm_trimesh *m2 = b->l->o->mesh[1];
+  const rm_trimesh *m2 = b->l->mesh[1];
 
   if (j >= 0 && m2->cell_vertex_offset[j] < m2->cell_vertex_offset[j + 1]) {
     touch_near(q, j);
@@ -313,8 +324,8 @@ static void sort_contacts(builder *b, int64_t first)
 
 static remap_status cross_edges(builder *b)
 {
-  const rm_trimesh *m1 = b->l->o->mesh[0];
-  const rm_trace   *trace = &b->l->o->trace[0];
+  const rm_trimesh *m1 = b->l->mesh[0];
+  const rm_trace   *trace = &b->o->trace[0];
 
   for (rm_lid e = 0; e < m1->num_edges; e++) {
     const rm_crossing *x = trace->crossing + trace->first[e];
@@ -327,7 +338,7 @@ static remap_status cross_edges(builder *b)
     sort_contacts(b, q.first);
   }
   for (int side = 0; side < 2; side++) {
-    const rm_trimesh *m = b->l->o->mesh[side];
+    const rm_trimesh *m = b->l->mesh[side];
     rm_lid           *first;
 
     RM_NEW0(first, b->scratch, (int64_t)m->num_edges + 2);
@@ -354,19 +365,19 @@ static remap_status push_spot(builder *b, rm_feature at1, rm_feature at2, rm_lid
 static remap_status vertex_spots(builder *b)
 {
   for (int side = 0; side < 2; side++) {
-    const rm_trimesh *m = b->l->o->mesh[side];
+    const rm_trimesh *m = b->l->mesh[side];
     rm_lid           *spot;
 
     RM_NEW(spot, b->arena, m->num_vertices);
     for (rm_lid v = 0; v < m->num_vertices; v++) {
-      const rm_feature own = {RM_ON_VERTEX, v}, other = b->at[side][v];
+      const rm_feature own = rm_feature_of(RM_ON_VERTEX, v), other = b->at[side][v];
       if (side == 1 && other.kind == RM_ON_VERTEX) spot[v] = b->l->vertex_spot[0][other.id];
       else RM_TRY(push_spot(b, side ? other : own, side ? own : other, &spot[v]));
     }
     b->l->vertex_spot[side] = spot;
   }
   for (int64_t k = 0; k < b->num_contacts; k++)
-    RM_TRY(push_spot(b, (rm_feature){RM_ON_EDGE, b->contact[k].edge[0]}, (rm_feature){RM_ON_EDGE, b->contact[k].edge[1]},
+    RM_TRY(push_spot(b, rm_feature_of(RM_ON_EDGE, b->contact[k].edge[0]), rm_feature_of(RM_ON_EDGE, b->contact[k].edge[1]),
                      &b->contact[k].spot));
   return REMAP_OK;
 }
@@ -374,7 +385,7 @@ static remap_status vertex_spots(builder *b)
 /* The contact at which edge e of `side` crosses triangle t of the other mesh, -1 if there is none. */
 static rm_lid contact_at(const builder *b, int side, rm_lid e, rm_lid t)
 {
-  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
+  const rm_trimesh *own = b->l->mesh[side], *other = b->l->mesh[1 - side];
 
   for (int h = 0; h < 2; h++) {
     const rm_lid v = own->edge[e][h];
@@ -394,60 +405,36 @@ static rm_lid contact_at(const builder *b, int side, rm_lid e, rm_lid t)
 
 static remap_status crossing_spots(builder *b, int side)
 {
-  const rm_trimesh *own = b->l->o->mesh[side];
-  const rm_trace   *trace = &b->l->o->trace[side];
+  const rm_trimesh *own = b->l->mesh[side];
+  const rm_trace   *trace = &b->o->trace[side];
   const rm_lid     *copy  = b->l->first_copy[1 - side];
   rm_lid           *spot;
 
-  RM_NEW(spot, b->passing, trace->num_crossings);
+  RM_NEW(spot, b->scratch, trace->num_crossings);
   for (rm_lid e = 0; e < own->num_edges; e++)
     for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) {
       const rm_lid     t = copy[trace->crossing[x].triangle / 2];
-      const rm_feature edge = {RM_ON_EDGE, e}, triangle = {RM_ON_TRIANGLE, t};
+      const rm_feature edge = rm_feature_of(RM_ON_EDGE, e), triangle = rm_feature_of(RM_ON_TRIANGLE, t);
 
       spot[x] = contact_at(b, side, e, t);
       for (int64_t y = trace->first[e]; y < x && spot[x] < 0; y++)
         if (copy[trace->crossing[y].triangle / 2] == t) spot[x] = spot[y];
       if (spot[x] < 0) RM_TRY(push_spot(b, side ? triangle : edge, side ? edge : triangle, &spot[x]));
     }
-  b->l->crossing_spot[side] = spot;
+  b->crossing_spot[side] = spot;
   return REMAP_OK;
 }
 
-static remap_status coordinates(builder *b)
+/* The spots are all there. */
+static remap_status keep_spots(builder *b)
 {
-  double (*xyz)[3];
-  float (*low)[3], *error;
   rm_spot *spot;
 
-  RM_NEW(spot, b->arena, b->l->num_spots);
-  RM_NEW(xyz, b->arena, b->l->num_spots);
-  RM_NEW0(low, b->arena, b->l->num_spots);
-  RM_NEW(error, b->arena, b->l->num_spots);
-  for (rm_lid p = 0; p < b->l->num_spots; p++) {
-    double line[2][3], plane[3][3], size = 0, reach = 0;
-
-    spot[p] = b->spot[p];
-    if (!rm_spot_meeting(b->l->o, &spot[p], line, plane)) {
-      memcpy(xyz[p], line[0], sizeof *xyz);
-      error[p] = 0;
-      continue;
-    }
-    const double lambda = rm_crossing_parameter(line[0], line[1], plane[0], plane[1], plane[2]);
-    for (int c = 0; c < 3; c++) {
-      const double u = line[1][c] - line[0][c];
-      const rm_dd  x = rm_two_sum(line[0][c], lambda * u);
-      xyz[p][c] = x.hi;
-      low[p][c] = (float)x.lo;
-      size      = fmax(size, fabs(u));
-      reach     = fmax(reach, fmax(fabs(line[0][c]), fabs(line[1][c])));
-    }
-    error[p] = (float)fmax(0x1.1p-48 * size + 0x1.1p-52 * reach, 0x1p-120); /* no smaller as a float */
-  }
-  b->l->spot  = spot;
-  b->l->xyz   = (const double (*)[3])xyz;
-  b->l->low   = (const float (*)[3])low;
-  b->l->error = error;
+  RM_NEW(spot, b->home->spots, b->l->num_spots);
+  if (b->l->num_spots) memcpy(spot, b->spot, sizeof *spot * (size_t)b->l->num_spots);
+  free(b->spot);
+  b->spot    = NULL;
+  b->l->spot = spot;
   return REMAP_OK;
 }
 
@@ -455,11 +442,11 @@ static remap_status coordinates(builder *b)
 
 static remap_status file_vertices(builder *b, int side)
 {
-  const rm_trimesh *own = b->l->o->mesh[side], *other = b->l->o->mesh[1 - side];
-  int64_t          *inner_offset;
-  rm_lid           *inner, *on_offset, *on, num_inner = 0, num_on = 0;
+  const rm_trimesh *own = b->l->mesh[side], *other = b->l->mesh[1 - side];
+  rm_arena         *lines = b->home->lines[side];
+  rm_lid           *inner_offset, *inner, *on_offset, *on, num_inner = 0, num_on = 0;
 
-  RM_NEW0(inner_offset, b->passing, (int64_t)own->num_triangles + 2);
+  RM_NEW0(inner_offset, lines, (int64_t)own->num_triangles + 2);
   RM_NEW0(on_offset, b->scratch, (int64_t)own->num_edges + 2);
   for (rm_lid v = 0; v < other->num_vertices; v++) {
     const rm_feature f = b->at[1 - side][v];
@@ -468,17 +455,56 @@ static remap_status file_vertices(builder *b, int side)
   }
   for (rm_lid t = 0; t < own->num_triangles; t++) inner_offset[t + 2] += inner_offset[t + 1];
   for (rm_lid e = 0; e < own->num_edges; e++) on_offset[e + 2] += on_offset[e + 1];
-  RM_NEW(inner, b->passing, num_inner);
+  RM_NEW(inner, lines, num_inner);
   RM_NEW(on, b->scratch, num_on);
   for (rm_lid v = 0; v < other->num_vertices; v++) {
     const rm_feature f = b->at[1 - side][v];
     if (f.kind == RM_ON_TRIANGLE) inner[inner_offset[f.id + 1]++] = b->l->vertex_spot[1 - side][v];
     if (f.kind == RM_ON_EDGE) on[on_offset[f.id + 1]++] = v;
   }
-  b->l->inner_offset[side] = inner_offset;
-  b->l->inner_spot[side]   = inner;
-  b->on_edge_offset[side]  = on_offset;
-  b->on_edge[side]         = on;
+  b->l->lines[side].inner_offset = inner_offset;
+  b->l->lines[side].inner_spot   = inner;
+  b->on_edge_offset[side]        = on_offset;
+  b->on_edge[side]               = on;
+  return REMAP_OK;
+}
+
+/* ---- segments ---------------------------------------------------------------------------------------------------- */
+
+/* Segment k / 2 of triangle t of mesh 1 in the limit; false if there it has no length, or a triangle is absent. */
+static bool limit_segment(const builder *b, rm_lid t, int64_t k, rm_segment *out)
+{
+  const rm_end *end = &b->o->end[k];
+  rm_lid        p[2];
+
+  for (int h = 0; h < 2; h++) p[h] = b->crossing_spot[end[h].at >> 1 & 1][end[h].at >> 2];
+  *out = (rm_segment){b->l->first_copy[1][end->other], p[0], p[1]};
+  return p[0] != p[1] && rm_is_present(b->l, 0, b->l->first_copy[0][t]) && rm_is_present(b->l, 1, out->other);
+}
+
+/* Those of triangles of mesh 1, copies of one triangle as those of the first, which stands before them. */
+static remap_status file_segments(builder *b)
+{
+  const rm_lid nt = b->l->mesh[0]->num_triangles;
+  rm_arena    *lines = b->home->lines[0];
+  rm_lid      *offset, num = 0;
+  rm_segment  *list, s;
+
+  if (b->o->end_offset[nt] / 2 > INT32_MAX) return REMAP_TOO_LARGE;
+  RM_NEW0(offset, lines, (int64_t)nt + 1);
+  for (rm_lid t = 0; t < nt; t++)
+    for (int64_t k = b->o->end_offset[t]; k < b->o->end_offset[t + 1]; k += 2) num += limit_segment(b, t, k, &s);
+  RM_NEW(list, lines, num);
+  num = 0;
+  for (rm_lid t = 0; t < nt; t++) {
+    for (int64_t k = b->o->end_offset[t]; k < b->o->end_offset[t + 1]; k += 2)
+      if (limit_segment(b, t, k, &s)) list[num++] = s;
+    offset[b->l->first_copy[0][t] + 1] = num;
+  }
+  for (rm_lid t = 0; t < nt; t++) /* copies have none */
+    if (b->l->first_copy[0][t] != t) offset[t + 1] = offset[t];
+  b->l->segment_offset = offset;
+  b->l->segment        = list;
   return REMAP_OK;
 }
 
@@ -495,20 +521,20 @@ static remap_status line_room(line *l)
   return rm_grow(&l->state, &l->room[1], l->num + 1, sizeof *l->state);
 }
 
-/* Put a spot inside edge e, which has no crossing, to its place among those from first on. */
-static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, int64_t first, rm_lid p)
+/* Put a spot inside edge e, which has no crossing, to its place. */
+static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, rm_lid p)
 {
-  const rm_trimesh *m  = b->l->o->mesh[side];
+  const rm_trimesh *m  = b->l->mesh[side];
   const double     *p0 = m->vertex[m->edge[e][0]], *p1 = m->vertex[m->edge[e][1]];
   double            mine[3][3], its[3][3];
-  int64_t           low = first + 1, high = l->num - 1; /* it lies before one of low..high */
+  int64_t           low = 1, high = l->num - 1; /* it lies before one of low..high */
 
-  for (int64_t k = first; k < l->num; k++)
+  for (int64_t k = 0; k < l->num; k++)
     if (l->spot[k] == p) return REMAP_OK;
-  rm_spot_plane(b->l->o, &b->l->spot[p], side, mine);
+  rm_spot_plane(b->l, &b->l->spot[p], side, mine);
   while (low < high) {
     const int64_t middle = (low + high) / 2;
-    rm_spot_plane(b->l->o, &b->l->spot[l->spot[middle]], side, its);
+    rm_spot_plane(b->l, &b->l->spot[l->spot[middle]], side, its);
     if (rm_crossing_order(p0, p1, (const double (*)[3])mine, (const double (*)[3])its, 1) < 0) high = middle;
     else low = middle + 1;
   }
@@ -522,15 +548,15 @@ static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, i
 
 static remap_status one_line(const builder *b, int side, rm_lid e, line *l)
 {
-  const rm_trimesh *m     = b->l->o->mesh[side];
-  const rm_trace   *trace = &b->l->o->trace[side];
-  const int64_t     first = l->num;
+  const rm_trimesh *m     = b->l->mesh[side];
+  const rm_trace   *trace = &b->o->trace[side];
 
+  l->num = 0;
   RM_TRY(line_room(l));
   l->spot[l->num]    = b->l->vertex_spot[side][m->edge[e][0]];
   l->state[l->num++] = trace->state[e];
   for (int64_t x = trace->first[e]; x < trace->first[e] + trace->count[e]; x++) {
-    const rm_lid p = b->l->crossing_spot[side][x];
+    const rm_lid p = b->crossing_spot[side][x];
     if (p != l->spot[l->num - 1]) {
       RM_TRY(line_room(l));
       l->spot[l->num++] = p;
@@ -544,38 +570,50 @@ static remap_status one_line(const builder *b, int side, rm_lid e, line *l)
   }
   if (!b->edge_present[side][e]) return REMAP_OK;
   for (rm_lid k = b->on_edge_offset[side][e]; k < b->on_edge_offset[side][e + 1]; k++)
-    RM_TRY(insert_spot(b, side, e, l, first, b->l->vertex_spot[1 - side][b->on_edge[side][k]]));
+    RM_TRY(insert_spot(b, side, e, l, b->l->vertex_spot[1 - side][b->on_edge[side][k]]));
   for (rm_lid k = b->contact_first[side][e]; k < b->contact_first[side][e + 1]; k++)
-    RM_TRY(insert_spot(b, side, e, l, first, b->contact[b->contact_of[side][k]].spot));
+    RM_TRY(insert_spot(b, side, e, l, b->contact[b->contact_of[side][k]].spot));
+  return REMAP_OK;
+}
+
+/* All spots inside edges; those at their ends are known. */
+static remap_status fill_lines(const builder *b, int side, line *l, rm_lid *offset, rm_lid *start, rm_lid *spot, rm_lid *state)
+{
+  const rm_lid n = b->l->mesh[side]->num_edges;
+
+  offset[0] = 0;
+  for (rm_lid e = 0; e < n; e++) {
+    RM_TRY(one_line(b, side, e, l));
+    const rm_lid inside = (rm_lid)l->num - 2;
+    start[e] = l->state[0];
+    memcpy(spot + offset[e], l->spot + 1, sizeof *spot * (size_t)inside);
+    memcpy(state + offset[e], l->state + 1, sizeof *state * (size_t)inside);
+    offset[e + 1] = offset[e] + inside;
+  }
   return REMAP_OK;
 }
 
 static remap_status lines(builder *b, int side)
 {
-  const rm_trimesh *m = b->l->o->mesh[side];
-  line              l = {0};
-  int64_t          *offset;
-  rm_lid           *spot, *state;
-  remap_status      status = REMAP_OK;
+  const rm_lid n    = b->l->mesh[side]->num_edges;
+  rm_arena    *home = b->home->lines[side];
+  const int64_t most = b->o->trace[side].num_crossings + b->on_edge_offset[side][n] + b->num_contacts;
+  line         l     = {0};
+  rm_lid      *offset, *start, *spot, *state;
+  remap_status status;
 
-  RM_NEW(offset, b->passing, (int64_t)m->num_edges + 1);
-  for (rm_lid e = 0; e < m->num_edges && status == REMAP_OK; e++) {
-    offset[e] = l.num;
-    status    = one_line(b, side, e, &l);
-  }
-  offset[m->num_edges] = l.num;
-  spot  = rm_arena_alloc(b->passing, l.num, sizeof *spot);
-  state = rm_arena_alloc(b->passing, l.num, sizeof *state);
-  if (status == REMAP_OK && !(spot && state)) status = REMAP_NO_MEMORY;
-  if (status == REMAP_OK && l.num) {
-    memcpy(spot, l.spot, sizeof *spot * (size_t)l.num);
-    memcpy(state, l.state, sizeof *state * (size_t)l.num);
-  }
+  if (most > INT32_MAX) return REMAP_TOO_LARGE;
+  RM_NEW(offset, home, (int64_t)n + 1);
+  RM_NEW(start, home, n);
+  RM_NEW(spot, home, most);
+  RM_NEW(state, home, most);
+  status = fill_lines(b, side, &l, offset, start, spot, state);
   free(l.spot);
   free(l.state);
-  b->l->line_offset[side] = offset;
-  b->l->line_spot[side]   = spot;
-  b->l->line_state[side]  = state;
+  b->l->lines[side].offset = offset;
+  b->l->lines[side].start  = start;
+  b->l->lines[side].spot   = spot;
+  b->l->lines[side].state  = state;
   return status;
 }
 
@@ -588,27 +626,33 @@ static remap_status build(builder *b)
   RM_TRY(cross_edges(b));
   RM_TRY(vertex_spots(b));
   for (int side = 0; side < 2; side++) RM_TRY(crossing_spots(b, side));
-  RM_TRY(coordinates(b));
+  RM_TRY(keep_spots(b));
+  RM_TRY(file_segments(b));
   for (int side = 0; side < 2; side++) RM_TRY(file_vertices(b, side));
   for (int side = 0; side < 2; side++) RM_TRY(lines(b, side));
   return REMAP_OK;
 }
 
-remap_status rm_limit_build(rm_arena *arena, rm_arena *passing, const rm_part *part, const rm_overlay *o, const rm_limit **out,
+remap_status rm_limit_build(const rm_limit_home *home, const rm_part *part, const rm_overlay *o, const rm_limit **out,
                             rm_reason *reason)
 {
-  builder      b = {.arena = arena, .passing = passing, .scratch = rm_arena_new(), .part = part, .reason = reason};
+  builder      b = {.home = home, .arena = home->rest, .scratch = rm_arena_new(), .part = part, .o = o, .reason = reason};
   remap_status status = b.scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
-  b.l = rm_arena_zero(arena, 1, sizeof *b.l);
+  b.l = rm_arena_zero(home->rest, 1, sizeof *b.l);
   if (!b.l) status = REMAP_NO_MEMORY;
   if (status == REMAP_OK) {
-    b.l->o = o;
+    for (int side = 0; side < 2; side++) b.l->mesh[side] = o->mesh[side];
     status = build(&b);
   }
   free(b.contact);
   free(b.spot);
   rm_arena_drop(b.scratch);
+  if (status == REMAP_OK && home->overlay) {
+    rm_arena_drop(*home->overlay);
+    *home->overlay = NULL;
+  }
+  if (status == REMAP_OK) status = rm_spot_coordinates(home, b.l);
   if (status == REMAP_OK) *out = b.l;
   return status;
 }

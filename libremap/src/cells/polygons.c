@@ -36,11 +36,6 @@ typedef struct edge_spot {
   rm_lid edge, spot;
 } edge_spot;
 
-/* A segment as one triangle sees it: from p to q the other triangle's left cell is on the left. */
-typedef struct segment {
-  rm_lid other, p, q;
-} segment;
-
 typedef struct work {
   rm_arena       *scratch;
   const rm_part  *part;
@@ -50,8 +45,8 @@ typedef struct work {
   int             side;
   rm_lid          t;
   rm_view         view;
-  int64_t        *segment_offset[2]; /* [side][num_triangles + 1] */
-  segment        *segment[2];
+  const rm_lid     *segment_offset; /* [num_triangles of mesh `side` + 1] */
+  const rm_segment *segment;
   rm_lid         *node_of; /* [num_spots] NOT_CALLED */
   rm_lid         *spot;    /* [num_nodes] */
   rm_lid         *degree_offset, *around, *component;
@@ -67,7 +62,7 @@ static inline int other_side(const work *w) { return 1 - w->side; }
 
 static remap_status tangled(const work *w)
 {
-  const rm_lid *cell = w->l->o->mesh[w->side]->side[w->t];
+  const rm_lid *cell = w->l->mesh[w->side]->side[w->t];
   const rm_lid  c    = cell[0] >= 0 ? cell[0] : cell[1];
   return rm_fail(
       REMAP_BAD_MESH, w->reason, w->side, c >= 0 ? w->part->piece[w->side].cell_global[c] : -1,
@@ -75,39 +70,27 @@ static remap_status tangled(const work *w)
       "needs cells that do not");
 }
 
-/* ---- segments of both sides -------------------------------------------------------------------------------------- */
+/* ---- segments of mesh 2 ------------------------------------------------------------------------------------------ */
 
-static remap_status file_segments(work *w)
+/* From those of mesh 1. */
+static remap_status turn_segments(work *w, rm_arena *arena)
 {
-  const rm_overlay *o = w->l->o;
+  const rm_limit *l = w->l;
+  const rm_lid    n[2] = {l->mesh[0]->num_triangles, l->mesh[1]->num_triangles}, num = l->segment_offset[n[0]];
+  rm_lid         *offset;
+  rm_segment     *list;
 
-  for (int side = 0; side < 2; side++) {
-    const rm_lid nt = o->mesh[side]->num_triangles;
-    int64_t     *offset;
-    segment     *s = NULL;
-
-    RM_NEW0(offset, w->scratch, (int64_t)nt + 2);
-    for (int pass = 0; pass < 2; pass++) {
-      for (rm_lid t = 0; t < o->mesh[0]->num_triangles; t++)
-        for (int64_t k = o->end_offset[t]; k < o->end_offset[t + 1]; k += 2) {
-          const rm_end *end = &o->end[k];
-          const rm_lid  b = end->other, own = w->l->first_copy[side][side ? b : t],
-                       other = w->l->first_copy[1 - side][side ? t : b];
-          rm_lid        p[2];
-          for (int h = 0; h < 2; h++) p[h] = w->l->crossing_spot[end[h].at >> 1 & 1][end[h].at >> 2];
-          if (p[0] == p[1] || !rm_is_present(w->l, 0, side ? other : own) || !rm_is_present(w->l, 1, side ? own : other))
-            continue;
-          if (pass == 0) offset[own + 2]++;
-          else s[offset[own + 1]++] = (segment){other, p[side], p[1 - side]};
-        }
-      if (pass == 0) {
-        for (rm_lid t = 0; t < nt; t++) offset[t + 2] += offset[t + 1];
-        RM_NEW(s, w->scratch, offset[nt + 1]);
-      }
+  RM_NEW0(offset, arena, (int64_t)n[1] + 2);
+  RM_NEW(list, arena, num);
+  for (rm_lid k = 0; k < num; k++) offset[l->segment[k].other + 2]++;
+  for (rm_lid t = 0; t < n[1]; t++) offset[t + 2] += offset[t + 1];
+  for (rm_lid t = 0; t < n[0]; t++)
+    for (rm_lid k = l->segment_offset[t]; k < l->segment_offset[t + 1]; k++) {
+      const rm_segment *s              = &l->segment[k];
+      list[offset[s->other + 1]++] = (rm_segment){t, s->q, s->p};
     }
-    w->segment_offset[side] = offset;
-    w->segment[side]        = s;
-  }
+  w->segment_offset = offset;
+  w->segment        = list;
   return REMAP_OK;
 }
 
@@ -138,7 +121,7 @@ static remap_status add_arc(work *w, rm_lid from, rm_lid to, rm_lid left, rm_lid
 
 static bool both_on_edge(const work *w, int side, rm_lid t, rm_lid p, rm_lid q)
 {
-  const rm_lid *e = w->l->o->mesh[side]->triangle_edge[t];
+  const rm_lid *e = w->l->mesh[side]->triangle_edge[t];
 
   for (int h = 0; h < 3; h++)
     if (rm_on_edge(w->l, side, p, e[h]) && rm_on_edge(w->l, side, q, e[h])) return true;
@@ -148,7 +131,7 @@ static bool both_on_edge(const work *w, int side, rm_lid t, rm_lid p, rm_lid q)
 /* A present triangle of mesh `side` on which both spots lie, and an edge of it on which they do, -1; false if there is none. */
 static bool carrier(const work *w, int side, rm_lid p, rm_lid q, rm_lid *triangle, rm_lid *edge)
 {
-  const rm_trimesh *m = w->l->o->mesh[side];
+  const rm_trimesh *m = w->l->mesh[side];
   const rm_feature  f = w->l->spot[p].at[side], g = w->l->spot[q].at[side];
   rm_lid            first = 0, last = 1;
 
@@ -181,18 +164,19 @@ static bool carrier(const work *w, int side, rm_lid p, rm_lid q, rm_lid *triangl
 
 static remap_status boundary(work *w)
 {
-  const rm_trimesh *m = w->l->o->mesh[w->side];
-  const rm_limit   *l = w->l;
+  const rm_trimesh *m = w->l->mesh[w->side];
+  const rm_limit   *l     = w->l;
+  const rm_lines   *lines = &l->lines[w->side];
 
   for (int h = 0; h < 3; h++) {
-    const rm_lid  e = m->triangle_edge[w->t][h];
-    const rm_lid *spot  = l->line_spot[w->side] + l->line_offset[w->side][e],
-                 *state = l->line_state[w->side] + l->line_offset[w->side][e];
-    const rm_lid  n = (rm_lid)(l->line_offset[w->side][e + 1] - l->line_offset[w->side][e]);
+    const rm_lid e = m->triangle_edge[w->t][h];
+    const rm_lid first = lines->offset[e], n = lines->offset[e + 1] - first;
+    const rm_lid end[2] = {l->vertex_spot[w->side][m->edge[e][0]], l->vertex_spot[w->side][m->edge[e][1]]};
 
-    for (rm_lid i = 0; i + 1 < n; i++) {
-      const rm_lid k = h == 2 ? n - 2 - i : i, p = spot[k], q = spot[k + 1];
-      rm_lid       at = state[k], triangle, edge;
+    for (rm_lid i = 0; i <= n; i++) { /* pieces of the edge, which the boundary runs along; against the third */
+      const rm_lid k = first + (h == 2 ? n - i : i);
+      const rm_lid p = k > first ? lines->spot[k - 1] : end[0], q = k < first + n ? lines->spot[k] : end[1];
+      rm_lid       at = k > first ? lines->state[k - 1] : lines->start[e], triangle, edge;
       if (carrier(w, other_side(w), p, q, &triangle, &edge)) at = RM_UNKNOWN;
       if (at < RM_OUTSIDE) return tangled(w);
       RM_TRY(h == 2 ? add_arc(w, q, p, at, OUTER) : add_arc(w, p, q, at, OUTER));
@@ -214,8 +198,8 @@ static remap_status segments(work *w)
 {
   const rm_limit *l = w->l;
 
-  for (int64_t k = w->segment_offset[w->side][w->t]; k < w->segment_offset[w->side][w->t + 1]; k++) {
-    const segment *s = &w->segment[w->side][k];
+  for (rm_lid k = w->segment_offset[w->t]; k < w->segment_offset[w->t + 1]; k++) {
+    const rm_segment *s = &w->segment[k];
     if (both_on_edge(w, w->side, w->t, s->p, s->q)) continue;
     const bool    along = both_on_edge(w, other_side(w), s->other, s->p, s->q);
     const rm_lid *cell  = l->cell[other_side(w)][s->other];
@@ -228,7 +212,7 @@ static remap_status segments(work *w)
 
 static remap_status push_touch(work *w, rm_lid spot)
 {
-  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const rm_trimesh *m = w->l->mesh[other_side(w)];
   const rm_feature  f = w->l->spot[spot].at[other_side(w)];
   rm_lid            first = 0, last = 1;
 
@@ -248,7 +232,7 @@ static int by_edge(const void *a, const void *b)
 
 static bool edge_is_present(const work *w, int side, rm_lid e)
 {
-  const rm_trimesh *m = w->l->o->mesh[side];
+  const rm_trimesh *m = w->l->mesh[side];
 
   for (rm_lid z = m->star_offset[e]; z < m->star_offset[e + 1]; z++)
     if (rm_is_present(w->l, side, w->l->first_copy[side][m->star[z] / 4])) return true;
@@ -258,12 +242,12 @@ static bool edge_is_present(const work *w, int side, rm_lid e)
 /* Edges of the other mesh that meet the closed triangle in two points lie in its plane, and nowhere else. */
 static remap_status edges_in_plane(work *w)
 {
-  const rm_limit *l = w->l;
+  const rm_lines *lines = &w->l->lines[w->side];
 
   w->num_touches = 0;
   for (rm_lid k = 0; k < w->num_boundary; k++) RM_TRY(push_touch(w, w->spot[k]));
-  for (int64_t k = l->inner_offset[w->side][w->t]; k < l->inner_offset[w->side][w->t + 1]; k++)
-    RM_TRY(push_touch(w, l->inner_spot[w->side][k]));
+  for (rm_lid k = lines->inner_offset[w->t]; k < lines->inner_offset[w->t + 1]; k++)
+    RM_TRY(push_touch(w, lines->inner_spot[k]));
   if (w->num_touches < 2) return REMAP_OK;
   qsort(w->touch, (size_t)w->num_touches, sizeof *w->touch, by_edge);
   for (rm_lid k = 0; k + 1 < w->num_touches; k++) {
@@ -288,7 +272,7 @@ static int by_ends(const void *a, const void *b)
 /* A corner of the triangle on the left of the line from a to b in its plane. */
 static const double *corner_left_of(const work *w, const double a[3], const double b[3])
 {
-  const rm_trimesh *m = w->l->o->mesh[w->side];
+  const rm_trimesh *m = w->l->mesh[w->side];
   const rm_lid     *v = m->triangle[w->t];
   double            o[3];
 
@@ -308,7 +292,7 @@ static bool same_side(const double f0[3], const double f1[3], const double x[3],
 /* The half-plane from f to x among the triangles of the other mesh around edge f: the triangle it lies in, or the cell. */
 static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *triangle, rm_lid *cell)
 {
-  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const rm_trimesh *m = w->l->mesh[other_side(w)];
   const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]], *nearest = NULL;
   int               nearest_quarter = 0;
 
@@ -339,7 +323,7 @@ static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *tri
  * lies, or the cell. False if there is nothing around f. */
 static bool place_left(const work *w, rm_lid p, rm_lid q, rm_lid f, rm_lid *triangle, rm_lid *cell)
 {
-  const rm_trimesh *m = w->l->o->mesh[other_side(w)];
+  const rm_trimesh *m = w->l->mesh[other_side(w)];
   const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]];
   int               sign = 0;
 
@@ -567,7 +551,7 @@ static remap_status find_holes(work *w, bool *any)
 /* Of a polygon that has no arc with a state: all its arcs lie on triangles of the other mesh. */
 static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *state)
 {
-  const rm_trimesh *own = w->l->o->mesh[w->side], *other = w->l->o->mesh[other_side(w)];
+  const rm_trimesh *own = w->l->mesh[w->side], *other = w->l->mesh[other_side(w)];
   const rm_lid      p = w->spot[w->half[c->half].from], q = w->spot[end_of(w, c->half)];
   rm_lid            b, f;
 
@@ -591,7 +575,7 @@ static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *st
 /* True if the normals of coplanar triangles t of `side` and b of the other mesh point the same way. */
 static bool same_way(const work *w, rm_lid b)
 {
-  const rm_trimesh *own = w->l->o->mesh[w->side], *other = w->l->o->mesh[other_side(w)];
+  const rm_trimesh *own = w->l->mesh[w->side], *other = w->l->mesh[other_side(w)];
   const rm_lid     *v = own->triangle[w->t], *u = other->triangle[b];
   double            o[3];
 
@@ -613,11 +597,13 @@ static remap_status push_polygon(work *w, rm_lid b, rm_lid state)
 {
   rm_polygons *out = w->out;
 
-  RM_TRY(rm_grow(&out->polygon, &out->room, out->num + 2, sizeof *out->polygon));
-  if (out->num == 0) out->polygon[0].first = 0;
-  out->polygon[out->num].own   = 2 * w->t + w->side;
-  out->polygon[out->num].other = b < 0 ? state : -2 - (2 * b + !same_way(w, b));
-  out->polygon[++out->num].first = out->num_vertices;
+  if (out->num == (1 << 30) - 1 || out->num_vertices > UINT32_MAX) return REMAP_TOO_LARGE;
+  RM_TRY(rm_grow(&out->first, &out->first_room, out->num + 2, sizeof *out->first));
+  RM_TRY(rm_grow(&out->own, &out->own_room, out->num + 1, sizeof *out->own));
+  RM_TRY(rm_grow(&out->other, &out->other_room, out->num + 1, sizeof *out->other));
+  out->own[out->num]     = 2 * w->t + w->side;
+  out->other[out->num]   = b < 0 ? state : -2 - (2 * b + !same_way(w, b));
+  out->first[++out->num] = (uint32_t)out->num_vertices;
   return REMAP_OK;
 }
 
@@ -692,31 +678,76 @@ static remap_status one_triangle(work *w)
   return status;
 }
 
-static remap_status all_triangles(work *w)
+/* Room for as many more polygons and vertices as the present mesh has in general position, where the graph of every triangle is
+ * connected: by Euler, one polygon and one more for each inner arc, less one for each vertex inside. */
+static remap_status reserve(const work *w)
 {
-  RM_TRY(file_segments(w));
+  const rm_limit   *l        = w->l;
+  const rm_trimesh *m        = l->mesh[w->side];
+  rm_polygons      *out      = w->out;
+  const int64_t     segments = w->segment_offset[m->num_triangles];
+  int64_t           polygons = segments + m->num_triangles, vertices = 2 * segments;
+
+  for (rm_lid p = 0; p < l->num_spots; p++) polygons -= l->spot[p].at[w->side].kind == RM_ON_TRIANGLE;
+  for (rm_lid t = 0; t < m->num_triangles; t++)
+    for (int h = 0; h < 3; h++) {
+      const rm_lid e = m->triangle_edge[t][h];
+      vertices += 1 + l->lines[w->side].offset[e + 1] - l->lines[w->side].offset[e];
+    }
+  polygons = out->num + (polygons < 0 ? 0 : polygons + polygons / 64);
+  RM_TRY(rm_grow(&out->first, &out->first_room, polygons + 1, sizeof *out->first));
+  RM_TRY(rm_grow(&out->own, &out->own_room, polygons, sizeof *out->own));
+  RM_TRY(rm_grow(&out->other, &out->other_room, polygons, sizeof *out->other));
+  if (!out->num) out->first[0] = 0;
+  return rm_grow(&out->vertex, &out->vertex_room, out->num_vertices + vertices, sizeof *out->vertex);
+}
+
+static remap_status all_triangles(work *w, rm_arena *lines[2])
+{
   RM_NEW(w->node_of, w->scratch, w->l->num_spots);
   for (rm_lid p = 0; p < w->l->num_spots; p++) w->node_of[p] = NOT_CALLED;
-  for (w->side = 0; w->side < 2; w->side++)
-    for (w->t = 0; w->t < w->l->o->mesh[w->side]->num_triangles; w->t++)
+  w->segment_offset = w->l->segment_offset;
+  w->segment        = w->l->segment;
+  for (w->side = 0; w->side < 2; w->side++) {
+    RM_TRY(reserve(w));
+    for (w->t = 0; w->t < w->l->mesh[w->side]->num_triangles; w->t++)
       if (rm_is_present(w->l, w->side, w->t)) RM_TRY(one_triangle(w));
+    if (w->side == 0) RM_TRY(turn_segments(w, lines[1]));
+    rm_arena_drop(lines[w->side]);
+    lines[w->side] = NULL;
+  }
   return REMAP_OK;
 }
 
-/* Give back what the arrays have grown too far. */
-static void trim(rm_polygons *out)
+/* Give back what an array has grown too far. */
+static void *trimmed(void *data, int64_t *room, int64_t num, size_t size)
 {
-  void *polygon = realloc(out->polygon, sizeof *out->polygon * ((size_t)out->num + 1));
-  void *vertex  = realloc(out->vertex, sizeof *out->vertex * ((size_t)out->num_vertices + 1));
+  void *moved = num < *room && num > 0 ? realloc(data, (size_t)num * size) : NULL;
 
-  if (polygon) out->polygon = polygon;
-  if (vertex) out->vertex = vertex;
+  if (moved) *room = num;
+  return moved ? moved : data;
 }
 
-remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygons *out, rm_reason *reason)
+void rm_polygons_trim(rm_polygons *p)
+{
+  p->first  = trimmed(p->first, &p->first_room, p->num + 1, sizeof *p->first);
+  p->own    = trimmed(p->own, &p->own_room, p->num, sizeof *p->own);
+  p->other  = trimmed(p->other, &p->other_room, p->num, sizeof *p->other);
+  p->vertex = trimmed(p->vertex, &p->vertex_room, p->num_vertices, sizeof *p->vertex);
+}
+
+void rm_polygons_free(rm_polygons *p)
+{
+  free(p->first);
+  free(p->own);
+  free(p->other);
+  free(p->vertex);
+}
+
+remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_arena *lines[2], rm_polygons *out, rm_reason *reason)
 {
   work         w      = {.scratch = rm_arena_new(), .part = part, .l = l, .reason = reason, .out = out};
-  remap_status status = w.scratch ? all_triangles(&w) : REMAP_NO_MEMORY;
+  remap_status status = w.scratch ? all_triangles(&w, lines) : REMAP_NO_MEMORY;
 
   free(w.spot);
   free(w.degree_offset);
@@ -727,6 +758,6 @@ remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_polygo
   free(w.cycle);
   free(w.touch);
   rm_arena_drop(w.scratch);
-  trim(out);
+  rm_polygons_trim(out);
   return status;
 }

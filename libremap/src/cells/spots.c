@@ -1,11 +1,12 @@
-/* spots -- exact signs of vertices of the supermesh. A spot that is no vertex of a mesh is the meeting of a line with a
- * plane, both through points in doubles: rational coordinates, numerators of degree 4 over denominators of degree 3. Doubles
- * with their error bounds decide nearly always (10 ns); integers (exact.h) the rest (a few us). */
+/* spots -- coordinates and exact signs of vertices of the supermesh. A spot that is no vertex of a mesh is the meeting of a
+ * line with a plane, both through points in doubles: rational coordinates, numerators of degree 4 over denominators of degree
+ * 3. Doubles with their error bounds decide nearly always (10 ns); integers (exact.h) the rest (a few us). */
 #include "cells/cells_private.h"
 
 #include <math.h>
 #include <string.h>
 #include "geom/exact.h"
+#include "geom/expansion.h"
 
 bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3])
 {
@@ -42,9 +43,9 @@ static void vertex_plane(const rm_trimesh *own, rm_lid e, const double vertex[3]
   plane[2][(k + 2) % 3] += 1;
 }
 
-void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double plane[3][3])
+void rm_spot_plane(const rm_limit *l, const rm_spot *spot, int side, double plane[3][3])
 {
-  const rm_trimesh *own = o->mesh[side], *other = o->mesh[1 - side];
+  const rm_trimesh *own = l->mesh[side], *other = l->mesh[1 - side];
   const rm_feature  f   = spot->at[1 - side];
   const rm_lid     *e   = own->edge[spot->at[side].id];
 
@@ -61,33 +62,78 @@ void rm_spot_plane(const rm_overlay *o, const rm_spot *spot, int side, double pl
 }
 
 /* Of two edges, the mesh whose edge begins at the lower point, or ends there: whichever mesh is called the first. */
-static int lower_edge(const rm_overlay *o, const rm_spot *spot)
+static int lower_edge(const rm_limit *l, const rm_spot *spot)
 {
-  const rm_lid *e = o->mesh[0]->edge[spot->at[0].id], *f = o->mesh[1]->edge[spot->at[1].id];
+  const rm_lid *e = l->mesh[0]->edge[spot->at[0].id], *f = l->mesh[1]->edge[spot->at[1].id];
 
   for (int h = 0; h < 2; h++)
     for (int c = 0; c < 3; c++) {
-      const double x = o->mesh[0]->vertex[e[h]][c], y = o->mesh[1]->vertex[f[h]][c];
+      const double x = l->mesh[0]->vertex[e[h]][c], y = l->mesh[1]->vertex[f[h]][c];
       if (x != y) return x < y ? 0 : 1;
     }
   return 0;
 }
 
-bool rm_spot_meeting(const rm_overlay *o, const rm_spot *spot, double line[2][3], double plane[3][3])
+bool rm_spot_meeting(const rm_limit *l, const rm_spot *spot, double line[2][3], double plane[3][3])
 {
   const bool edge[2] = {spot->at[0].kind == RM_ON_EDGE, spot->at[1].kind == RM_ON_EDGE};
 
   for (int side = 0; side < 2; side++)
     if (spot->at[side].kind == RM_ON_VERTEX) {
-      memcpy(line[0], o->mesh[side]->vertex[spot->at[side].id], sizeof line[0]);
+      memcpy(line[0], l->mesh[side]->vertex[spot->at[side].id], sizeof line[0]);
       return false;
     }
-  const int         own = edge[0] && edge[1] ? lower_edge(o, spot) : edge[0] ? 0 : 1;
-  const rm_trimesh *m   = o->mesh[own];
+  const int         own = edge[0] && edge[1] ? lower_edge(l, spot) : edge[0] ? 0 : 1;
+  const rm_trimesh *m   = l->mesh[own];
 
   for (int h = 0; h < 2; h++) memcpy(line[h], m->vertex[m->edge[spot->at[own].id][h]], sizeof line[h]);
-  rm_spot_plane(o, spot, own, plane);
+  rm_spot_plane(l, spot, own, plane);
   return true;
+}
+
+/* ---- coordinates ------------------------------------------------------------------------------------------------- */
+
+/* The spot in two parts, low what rounding took from xyz; *error is a bound of the error of each coordinate. */
+static void place(const rm_limit *l, const rm_spot *spot, double xyz[3], float low[3], float *error)
+{
+  double line[2][3], plane[3][3], size = 0, reach = 0;
+
+  if (!rm_spot_meeting(l, spot, line, plane)) {
+    memcpy(xyz, line[0], sizeof line[0]);
+    low[0] = low[1] = low[2] = *error = 0;
+    return;
+  }
+  const double lambda = rm_crossing_parameter(line[0], line[1], plane[0], plane[1], plane[2]);
+  for (int c = 0; c < 3; c++) {
+    const double u = line[1][c] - line[0][c];
+    const rm_dd  x = rm_two_sum(line[0][c], lambda * u);
+    xyz[c] = x.hi;
+    low[c] = (float)x.lo;
+    size   = rm_max(size, fabs(u));
+    reach  = rm_max(reach, rm_max(fabs(line[0][c]), fabs(line[1][c])));
+  }
+  *error = (float)rm_max(0x1.1p-48 * size + 0x1.1p-52 * reach, 0x1p-120); /* no smaller as a float */
+}
+
+remap_status rm_spot_coordinates(const rm_limit_home *home, rm_limit *l)
+{
+  float *error, low[3];
+
+  RM_NEW(l->xyz, home->spots, l->num_spots);
+  RM_NEW(error, home->rest, l->num_spots);
+  for (rm_lid p = 0; p < l->num_spots; p++) place(l, &l->spot[p], l->xyz[p], low, &error[p]);
+  l->error = error;
+  return REMAP_OK;
+}
+
+remap_status rm_spot_low(rm_arena *arena, const rm_limit *l, float (**out)[3])
+{
+  double xyz[3];
+  float  error;
+
+  RM_NEW(*out, arena, l->num_spots);
+  for (rm_lid p = 0; p < l->num_spots; p++) place(l, &l->spot[p], xyz, (*out)[p], &error);
+  return REMAP_OK;
 }
 
 /* ---- integers ---------------------------------------------------------------------------------------------------- */
@@ -108,7 +154,7 @@ static int scale_of(const rm_limit *l, int n, const rm_lid spot[], meeting out[]
   int           num = 0;
 
   for (int k = 0; k < n; k++) {
-    out[k].crosses = rm_spot_meeting(l->o, &l->spot[spot[k]], out[k].line, out[k].plane);
+    out[k].crosses = rm_spot_meeting(l, &l->spot[spot[k]], out[k].line, out[k].plane);
     point[num++]   = out[k].line[0];
     if (!out[k].crosses) continue;
     point[num++] = out[k].line[1];
@@ -181,7 +227,7 @@ static __attribute__((noinline)) int exact_compare(const rm_limit *l, const rm_l
 
 rm_view rm_view_of(const rm_limit *l, int side, rm_lid t)
 {
-  const rm_trimesh *m = l->o->mesh[side];
+  const rm_trimesh *m = l->mesh[side];
   const double     *a = m->vertex[m->triangle[t][0]], *b = m->vertex[m->triangle[t][1]], *c = m->vertex[m->triangle[t][2]];
   double            o[3];
   int               k = 0;

@@ -53,8 +53,9 @@ static remap_status add_cells(work *w)
 /* The passing cell behind face f of what was made; -1 if there is none. */
 static rm_lid cell_behind(const work *w, rm_lid f, int *side)
 {
-  const rm_lid *beyond = w->cells->face_beyond[f];
+  const rm_lid *beyond = rm_cells_beyond(w->cells, f);
 
+  if (!beyond) return -1;
   *side = beyond[0] >= 0 ? 0 : 1;
   if (beyond[*side] < 0 || beyond[1 - *side] >= 0 || !rm_super_passes(w->job, *side)) return -1;
   return w->cover->flag[*side][beyond[*side]] & RM_COVER_MET ? -1 : beyond[*side];
@@ -89,7 +90,7 @@ static void pack(const work *w, int64_t *next_face, int64_t *next_xyz, parcel *p
     const rm_soup_face *made  = &w->soup->face[f];
     if (p->face) {
       p->face[next_face[home]] = (wire_face){side, (int32_t)n, piece->cell_home[cell],
-                                             face_at_home(w, side, w->cells->face_triangle[f][side], cell),
+                                             face_at_home(w, side, rm_cells_triangle(w->cells, f, side), cell),
                                              {made->from[0], made->from[1]}, {made->from_rank[0], made->from_rank[1]}};
       for (int64_t k = 0; k < n; k++)
         memcpy(p->xyz[next_xyz[home] + k], w->cells->vertex[w->cells->face_vertex[first + k]], sizeof *p->xyz);

@@ -31,9 +31,10 @@ static remap_status check_flat(rm_arena *passing, const rm_trimesh *m, const uin
 static void check_stacks(const rm_trimesh *m, const rm_cells *cells, int side, const uint8_t *flag, bool *regular)
 {
   for (rm_lid f = 0; f < cells->num_faces; f++) {
-    const rm_lid t = cells->face_triangle[f][side], beyond = cells->face_beyond[f][side];
+    const rm_lid  t      = rm_cells_triangle(cells, f, side);
+    const rm_lid *beyond = rm_cells_beyond(cells, f);
 
-    if (t < 0 || beyond < 0 || (flag[beyond] & RM_COVER_MET)) continue;
+    if (t < 0 || !beyond || beyond[side] < 0 || (flag[beyond[side]] & RM_COVER_MET)) continue;
     if (t + 1 < m->num_triangles && !memcmp(m->triangle[t + 1], m->triangle[t], sizeof *m->triangle)) *regular = false;
   }
 }

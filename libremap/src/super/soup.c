@@ -109,7 +109,8 @@ static remap_status add_spot(rm_soup *soup, const rm_trimesh *const mesh[2], rm_
     const int         side = k ? 1 - first : first;
     const rm_feature  f    = spot->at[side];
     const rm_trimesh *m    = mesh[side];
-    const rm_lid     *list = f.kind == RM_ON_VERTEX ? &f.id : f.kind == RM_ON_EDGE ? m->edge[f.id] : m->triangle[f.id];
+    const rm_lid      id   = f.id;
+    const rm_lid     *list = f.kind == RM_ON_VERTEX ? &id : f.kind == RM_ON_EDGE ? m->edge[f.id] : m->triangle[f.id];
     const int         num  = f.kind == RM_ON_VERTEX ? 1 : f.kind == RM_ON_EDGE ? 2 : 3;
 
     for (int h = 0; h < num; h++) RM_TRY(corner_of(soup, mesh, corner_of_vertex, side, list[h], &v.corner[n++]));
@@ -171,8 +172,8 @@ static remap_status add_face(rm_soup *soup, const rm_part *part, const rm_trimes
   const rm_lid *cell = cells->face_cell[f];
   rm_soup_face  face = {0, {first_cell + cell[0], cell[1] < 0 ? -1 : first_cell + cell[1]}, {-1, -1}, {-1, -1}};
 
-  for (int side = 0; side < 2; side++) origin_of(part, mesh, side, cells->face_triangle[f][side], &face);
-  for (int64_t k = cells->face_offset[f]; k < cells->face_offset[f + 1]; k++)
+  for (int side = 0; side < 2; side++) origin_of(part, mesh, side, rm_cells_triangle(cells, f, side), &face);
+  for (uint32_t k = cells->face_offset[f]; k < cells->face_offset[f + 1]; k++)
     RM_TRY(rm_soup_add_to_loop(soup, first_vertex + cells->face_vertex[k]));
   return rm_soup_end_face(soup, face);
 }
