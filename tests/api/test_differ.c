@@ -8,13 +8,15 @@ typedef struct world {
   remap_context *ctx;
   tm_mesh       *mine[2];
   double        *u[2], *got[2]; /* [side][cells][MOST_FIELDS] */
+  double        *pieces;        /* [MOST_PIECES]              */
 } world;
 
-enum { MOST_FIELDS = 24 };
+enum { MOST_FIELDS = 24, MOST_PIECES = 10000 };
 
 static void open_world(world *w, int n)
 {
   RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &w->ctx), REMAP_OK);
+  w->pieces = tm_alloc_(MOST_PIECES, sizeof *w->pieces);
   for (int side = 0; side < 2; side++) {
     static const double away[12] = {1, 0, 0, .3, 0, 1, 0, .2, 0, 0, 1, -.1};
     tm_mesh            *whole    = tm_hexahedra((int[]){n, n, n + side}, tm_warp, &(tm_warping){0.03, 0.7});
@@ -33,6 +35,7 @@ static void open_world(world *w, int n)
 static void close_world(world *w)
 {
   remap_destroy(&w->ctx);
+  free(w->pieces);
   for (int side = 0; side < 2; side++) tm_free(w->mine[side]), free(w->u[side]), free(w->got[side]);
 }
 
@@ -57,8 +60,22 @@ static remap_status transfer(world *w, int d, int order, remap_limiter limiter, 
   return status != REMAP_OK ? status : remap_field_finish(w->ctx, (remap_direction)d, how == HALVES_WITH ? report : NULL);
 }
 
+static remap_status make_supermesh(world *w)
+{
+  remap_supermesh_view view;
+  const remap_status   status = remap_supermesh(w->ctx, NULL, &view);
+
+  if (status == REMAP_OK) RT_CHECK(view.num_cells <= MOST_PIECES);
+  return status;
+}
+
+static remap_status take_over(world *w, remap_side side)
+{
+  return remap_supermesh_cell_values(w->ctx, side, w->u[side], 0.0, w->pieces);
+}
+
 /* Calls that no two of are alike. The last three change the context if all make them. */
-enum { NUM_CALLS = 21 };
+enum { NUM_CALLS = 24 };
 static bool         is_wrong_anyway(int call) { return call == 12 || call == 13 || call == 17; }
 static remap_status make_call(world *w, int call)
 {
@@ -86,8 +103,11 @@ static remap_status make_call(world *w, int call)
     case 15: return remap_partial_cells(w->ctx, REMAP_TARGET, &two, partial);
     case 16: return transfer(w, 0, 2, REMAP_LIMITER_AUTO, MOST_FIELDS, WITHOUT); /* is prepared for by all together */
     case 17: return transfer(w, 0, 99, REMAP_LIMITER_NONE, 1, HALVES);
-    case 18: return remap_set_masks(w->ctx, NULL);
-    case 19: return remap_move(w->ctx, motion);
+    case 18: return make_supermesh(w);
+    case 19: return take_over(w, REMAP_SOURCE);
+    case 20: return take_over(w, REMAP_TARGET);
+    case 21: return remap_set_masks(w->ctx, NULL);
+    case 22: return remap_move(w->ctx, motion);
     default: return remap_build(w->ctx);
   }
 }
@@ -99,6 +119,7 @@ static void prepare(world *w)
   RT_EQ(transfer(w, 0, 2, REMAP_LIMITER_AUTO, 2, WITHOUT), REMAP_OK);
   RT_EQ(transfer(w, 0, 2, REMAP_LIMITER_CAAS, 2, WITHOUT), REMAP_OK);
   RT_EQ(transfer(w, 1, 2, REMAP_LIMITER_AUTO, 2, WITHOUT), REMAP_OK);
+  RT_EQ(make_supermesh(w), REMAP_OK);
 }
 
 /* Rank `odd` makes one call, the others another. */
@@ -112,6 +133,7 @@ static bool differ(world *w, int odd, int one, int other)
   if (!rt_all(ok)) return false;
   ok = RT_EQ(remap_agree(w->ctx, mine), REMAP_BAD_ARGUMENT);
   ok &= RT_EQ(transfer(w, 0, 1, REMAP_LIMITER_NONE, 1, WITHOUT), REMAP_OK);
+  ok &= RT_EQ(take_over(w, REMAP_SOURCE), REMAP_OK); /* the supermesh is still there, too */
   return rt_all(ok);
 }
 

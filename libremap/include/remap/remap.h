@@ -22,7 +22,9 @@
  *     same status on each of them;
  *   - ranks that call different functions of a context, or differ in what they must agree on, do not wait
  *     for each other: those that notice return REMAP_BAD_ARGUMENT, and the next call that all make alike
- *     is not affected (not so for remap_create and remap_destroy);
+ *     is not affected. Two differences cannot be noticed, and leave ranks waiting as any collective call of
+ *     MPI would: remap_create on some ranks of its communicator only, and a rank that destroys its context
+ *     while others go on to use theirs;
  *   - ranks without cells are welcome: their counts are 0 and their arrays may be NULL;
  *   - outputs are written only when REMAP_OK is returned;
  *   - lengths are in the caller's unit, volumes in that unit cubed;
@@ -510,7 +512,8 @@ REMAP_API remap_status remap_supermesh_cell_values(remap_context *ctx, remap_sid
 REMAP_API remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none,
                                                    int32_t *out);
 
-/** End a context and set *ctx to NULL. Collective, and harmless on a NULL context. */
+/** End a context and set *ctx to NULL. Collective, and harmless on a NULL context. No rank waits for another, so ranks may end
+ *  several contexts in different orders where MPI_Comm_free allows it. */
 REMAP_API void remap_destroy(remap_context **ctx);
 
 #ifdef __cplusplus

@@ -61,21 +61,26 @@ remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *
 {
   remap_supermesh_options chosen;
   rm_reason               reason = {-1, -1, ""};
-  rm_arena               *passing;
+  rm_arena               *passing, *own;
   remap_status            status;
 
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  passing         = rm_arena_new();
+  own             = rm_arena_new();
   ctx->message[0] = '\0';
   remap_supermesh_options_default(&chosen);
   if (options) chosen = *options;
-  rm_context_drop_super(ctx);
-  ctx->super_arena = rm_arena_new();
-  passing          = rm_arena_new();
-  status = rm_context_start_call(ctx, RM_CALL_SUPERMESH, ctx->super_arena && passing ? REMAP_OK : REMAP_NO_MEMORY, &reason);
-  if (status == REMAP_OK) status = supermesh(ctx, &chosen, out != NULL, passing, &reason);
-  rm_arena_drop(passing);
-  if (status != REMAP_OK) {
+  status = rm_context_start_call(ctx, RM_CALL_SUPERMESH, own && passing ? REMAP_OK : REMAP_NO_MEMORY, &reason);
+  if (status == REMAP_OK) { /* the last one stays where the call is refused */
     rm_context_drop_super(ctx);
+    ctx->super_arena = own;
+    own              = NULL;
+    status           = supermesh(ctx, &chosen, out != NULL, passing, &reason);
+    if (status != REMAP_OK) rm_context_drop_super(ctx);
+  }
+  rm_arena_drop(passing);
+  rm_arena_drop(own);
+  if (status != REMAP_OK) {
     rm_context_explain(ctx, status, &reason);
     return status;
   }
@@ -115,69 +120,82 @@ static remap_status sort_wants(rm_arena *passing, int64_t n, const int32_t *from
   return REMAP_OK;
 }
 
-/* out[k] = in[origin of k], `size` bytes each, where there is one. Collective. */
-static remap_status fetch(remap_context *ctx, rm_arena *passing, int64_t n, const int32_t *from, const int32_t *from_rank,
-                          size_t size, const void *in, void *out)
+/* Entities of a supermesh, and where they come from. */
+typedef struct origins {
+  int64_t        num;
+  const int32_t *from, *from_rank; /* [num] */
+} origins;
+
+/* out[k] = in[origin of k], `size` bytes each, *none where there is none; untouched after a failure. Collective. */
+static remap_status fetch(const rm_comm *comm, rm_arena *passing, const origins *of, size_t size, const void *in,
+                          const void *none, void *out)
 {
-  const rm_comm *comm = &ctx->comm;
   const rm_plan *plan;
   wants          w = {0};
   char          *received = NULL, *buffer = NULL;
   remap_status   status;
 
-  RM_TRY(rm_comm_agree(comm, passing ? sort_wants(passing, n, from, from_rank, &w) : REMAP_NO_MEMORY, NULL));
+  RM_TRY(rm_comm_agree(comm, sort_wants(passing, of->num, of->from, of->from_rank, &w), NULL));
   RM_TRY(rm_plan_build(comm, passing, w.num, w.rank, w.item, &plan));
   received = rm_arena_alloc(passing, w.num, size);
   buffer   = rm_arena_alloc(passing, plan->send_offset[plan->num_send], size);
   status   = received && buffer ? REMAP_OK : REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
   RM_TRY(rm_comm_agree(comm, rm_plan_run(comm, plan, size, in, received, buffer), NULL));
+  for (int64_t k = 0; k < of->num; k++) memcpy((char *)out + (size_t)k * size, none, size);
   for (int64_t k = 0; k < w.num; k++) memcpy((char *)out + (size_t)w.at[k] * size, received + (size_t)k * size, size);
   return REMAP_OK;
 }
 
-/* What can be wrong with a call of the two functions below. Collective. */
-static remap_status may_fetch(remap_context *ctx, remap_side side, const void *in, const void *out, bool faces)
+/* What can be wrong with a call of the two functions below on this rank. Not collective. */
+static remap_status may_carry(const remap_context *ctx, remap_side side, bool faces, const void *in, const void *out,
+                              rm_reason *reason)
 {
-  remap_status status = REMAP_OK;
+  if (!ctx->super) return rm_fail(REMAP_BAD_ORDER, reason, -1, -1, "values are taken over after a successful remap_supermesh");
+  if (side != REMAP_SOURCE && side != REMAP_TARGET)
+    return rm_fail(REMAP_BAD_ARGUMENT, reason, -1, -1, "side is %d, neither source nor target", (int)side);
+  const int64_t num_in  = faces ? ctx->mesh[side]->num_faces : ctx->mesh[side]->num_cells;
+  const int64_t num_out = faces ? ctx->super->view.num_faces : ctx->super->view.num_cells;
+
+  if ((!in && num_in > 0) || (!out && num_out > 0))
+    return rm_fail(REMAP_BAD_ARGUMENT, reason, side, -1, "the values to take over, or the room for them, are NULL");
+  return REMAP_OK;
+}
+
+/* Values of `size` bytes of the cells or faces of a side. Collective. */
+static remap_status carry(remap_context *ctx, remap_side side, bool faces, size_t size, const void *in, const void *none,
+                          void *out)
+{
+  rm_reason    reason  = {-1, -1, ""};
+  rm_arena    *passing = rm_arena_new();
+  remap_status status  = may_carry(ctx, side, faces, in, out, &reason);
 
   ctx->message[0] = '\0';
-  if (!ctx->super) {
-    status = REMAP_BAD_ORDER;
-  } else if (side != REMAP_SOURCE && side != REMAP_TARGET) {
-    status = REMAP_BAD_ARGUMENT;
-  } else {
-    const int64_t num_in  = faces ? ctx->mesh[side]->num_faces : ctx->mesh[side]->num_cells;
-    const int64_t num_out = faces ? ctx->super->view.num_faces : ctx->super->view.num_cells;
-    if ((!in && num_in > 0) || (!out && num_out > 0)) status = REMAP_BAD_ARGUMENT;
+  if (status == REMAP_OK && !passing) status = REMAP_NO_MEMORY;
+  const remap_status entered = rm_context_enter(ctx, RM_CALL_SUPERMESH_VALUES, 2 * (int)side + faces, &reason);
+
+  status = entered == REMAP_OK ? rm_comm_agree_reason(&ctx->comm, status, &reason) : entered;
+  if (status == REMAP_OK) {
+    const rm_super *s = ctx->super;
+    const origins   of =
+        faces ? (origins){s->view.num_faces, s->view.face_from[side], s->view.face_from_rank[side]}
+              : (origins){s->view.num_cells, s->cell_home[side], s->cell_rank[side]};
+
+    status = fetch(&ctx->comm, passing, &of, size, in, none, out);
   }
-  return rm_comm_agree(&ctx->comm, status, NULL);
+  rm_arena_drop(passing);
+  if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
+  return status;
 }
 
 remap_status remap_supermesh_cell_values(remap_context *ctx, remap_side side, const double *in, double none, double *out)
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
-  RM_TRY(may_fetch(ctx, side, in, out, false));
-  rm_arena    *passing = rm_arena_new();
-  remap_status status;
-
-  for (int64_t c = 0; c < ctx->super->view.num_cells; c++) out[c] = none;
-  status = fetch(ctx, passing, ctx->super->view.num_cells, ctx->super->cell_home[side], ctx->super->cell_rank[side], sizeof *in,
-                 in, out);
-  rm_arena_drop(passing);
-  return status;
+  return carry(ctx, side, false, sizeof *in, in, &none, out);
 }
 
 remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none, int32_t *out)
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
-  RM_TRY(may_fetch(ctx, side, in, out, true));
-  const remap_supermesh_view *v = &ctx->super->view;
-  rm_arena                   *passing = rm_arena_new();
-  remap_status                status;
-
-  for (int64_t f = 0; f < v->num_faces; f++) out[f] = none;
-  status = fetch(ctx, passing, v->num_faces, v->face_from[side], v->face_from_rank[side], sizeof *in, in, out);
-  rm_arena_drop(passing);
-  return status;
+  return carry(ctx, side, true, sizeof *in, in, &none, out);
 }

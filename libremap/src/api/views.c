@@ -148,34 +148,43 @@ done:
   return status;
 }
 
+/* The pairs of a direction in the caller's unit. The arrays live in arena. */
+static remap_status copy_pairs(rm_arena *arena, const rm_rows *rows, double unit, remap_pairs_view *out)
+{
+  const double  cubed = unit * unit * unit;
+  const int64_t n     = rows->offset[rows->num_cells];
+  int64_t      *global;
+  int          *rank;
+  double       *volume, *moment, *second = NULL;
+
+  RM_NEW(global, arena, n);
+  RM_NEW(rank, arena, n);
+  RM_NEW(volume, arena, n);
+  RM_NEW(moment, arena, 3 * n);
+  if (rows->second) RM_NEW(second, arena, 6 * n);
+  for (int64_t k = 0; k < n; k++) {
+    global[k] = rows->giver_global[rows->giver[k]];
+    rank[k]   = rows->giver_rank[rows->giver[k]];
+    volume[k] = rows->volume[k] * cubed;
+    for (int a = 0; a < 3; a++) moment[3 * k + a] = rows->moment[k][a] * cubed * unit;
+    for (int a = 0; a < 6 && second; a++) second[6 * k + a] = rows->second[k][a] * cubed * unit * unit;
+  }
+  *out = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same, second};
+  return REMAP_OK;
+}
+
 remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pairs_view *out)
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   RM_TRY(rm_context_check_view(ctx, out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), "remap_pairs"));
   const rm_rows    *rows = rows_of(ctx, direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE);
   rm_arena         *arena = ctx->mask_arena ? ctx->mask_arena : ctx->arena;
-  const double      unit = 1 / ctx->frame.scale, cubed = unit * unit * unit;
-  const int64_t     n = rows->offset[rows->num_cells];
   remap_pairs_view *view = &ctx->view[direction];
-  int64_t          *global;
-  int              *rank;
-  double           *volume, *moment, *second = NULL;
 
-  if (!view->row_offset) {
-    RM_NEW(global, arena, n);
-    RM_NEW(rank, arena, n);
-    RM_NEW(volume, arena, n);
-    RM_NEW(moment, arena, 3 * n);
-    if (rows->second) RM_NEW(second, arena, 6 * n);
-    for (int64_t k = 0; k < n; k++) {
-      global[k] = rows->giver_global[rows->giver[k]];
-      rank[k]   = rows->giver_rank[rows->giver[k]];
-      volume[k] = rows->volume[k] * cubed;
-      for (int a = 0; a < 3; a++) moment[3 * k + a] = rows->moment[k][a] * cubed * unit;
-      for (int a = 0; a < 6 && second; a++) second[6 * k + a] = rows->second[k][a] * cubed * unit * unit;
-    }
-    *view = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same, second};
-  }
+  if (!view->row_offset && copy_pairs(arena, rows, 1 / ctx->frame.scale, view) != REMAP_OK)
+    return rm_context_fail(ctx, REMAP_NO_MEMORY,
+                           "remap_pairs: no memory for copies of the %lld pairs of this rank: use more ranks",
+                           (long long)rows->offset[rows->num_cells]);
   *out = *view;
   return REMAP_OK;
 }
