@@ -1,9 +1,10 @@
 /* Vertex neighbours and their weights on meshes of every kind, in place and size of every kind. */
 #include "boxes.h"
+#include "surfaces.h"
 #include "field/field.h"
 
 /* What a mesh of the tests is made of. */
-typedef enum mesh_kind { HEXAHEDRA, TETRAHEDRA, PRISMS, PYRAMIDS, MIXED, REFINED, DUAL, NUM_KINDS } mesh_kind;
+typedef enum mesh_kind { HEXAHEDRA, TETRAHEDRA, PRISMS, PYRAMIDS, MIXED, REFINED, DUAL, NUM_KINDS, CROWDED } mesh_kind;
 
 static tm_mesh *make(mesh_kind kind)
 {
@@ -16,6 +17,7 @@ static tm_mesh *make(mesh_kind kind)
     case MIXED: return tm_mixed((int[]){5, 3, 3}, tm_warp, &warp);
     case REFINED: return tm_refined((int[]){4, 4, 4}, tm_right_half, tm_warp, &warp);
     case DUAL: return tm_dual((int[]){3, 3, 3}, tm_warp, &warp);
+    case CROWDED: return surfaces_wedges(1500);
     default: return tm_hexahedra((int[]){5, 4, 6}, tm_warp, &warp);
   }
 }
@@ -105,31 +107,46 @@ static const rm_gid *globals_with_halo(boxes_world *w)
   return all;
 }
 
+static void check_bits_of_one_rank(mesh_kind kind, tm_dealing deal)
+{
+  boxes_world   w, alone;
+  const rm_gid *global;
+
+  open_mesh(&w, MPI_COMM_WORLD, make(kind), deal);
+  open_mesh(&alone, MPI_COMM_SELF, make(kind), TM_SLABS);
+  global = globals_with_halo(&w);
+  RT_EQ(alone.stencil[0]->num_halo, 0);
+  for (rm_lid c = 0; c < w.mesh[0]->num_cells; c++) {
+    const rm_stencil *s = w.stencil[0], *t = alone.stencil[0];
+    const rm_lid      other = boxes_find(alone.mesh[0], w.mesh[0]->cell_global[c]);
+    const int64_t     num   = s->offset[c + 1] - s->offset[c];
+
+    if (!RT_EQ(num, t->offset[other + 1] - t->offset[other])) continue;
+    for (int64_t i = 0; i < num; i++) {
+      RT_EQ(global[s->neighbour[s->offset[c] + i]], alone.mesh[0]->cell_global[t->neighbour[t->offset[other] + i]]);
+      RT_CHECK(boxes_same_bits(s->weight[s->offset[c] + i], t->weight[t->offset[other] + i], 3 * sizeof(double)));
+    }
+  }
+  boxes_close(&alone);
+  boxes_close(&w);
+}
+
 static void stencils_are_those_of_one_rank_bit_by_bit(void)
 {
   for (mesh_kind k = HEXAHEDRA; k < NUM_KINDS; k++)
-    for (int deal = TM_SLABS; deal <= TM_LAST; deal++) {
-      boxes_world   w, alone;
-      const rm_gid *global;
+    for (int deal = TM_SLABS; deal <= TM_LAST; deal++) check_bits_of_one_rank(k, (tm_dealing)deal);
+}
 
-      open_mesh(&w, MPI_COMM_WORLD, make(k), (tm_dealing)deal);
-      open_mesh(&alone, MPI_COMM_SELF, make(k), TM_SLABS);
-      global = globals_with_halo(&w);
-      RT_EQ(alone.stencil[0]->num_halo, 0);
-      for (rm_lid c = 0; c < w.mesh[0]->num_cells; c++) {
-        const rm_stencil *s = w.stencil[0], *t = alone.stencil[0];
-        const rm_lid      other = boxes_find(alone.mesh[0], w.mesh[0]->cell_global[c]);
-        const int64_t     num   = s->offset[c + 1] - s->offset[c];
+/* Round an edge, where a mesh one cell long has no slope along it. */
+static void cells_that_are_very_many_round_an_edge_have_few_neighbours_that_do(void)
+{
+  boxes_world w;
 
-        if (!RT_EQ(num, t->offset[other + 1] - t->offset[other])) continue;
-        for (int64_t i = 0; i < num; i++) {
-          RT_EQ(global[s->neighbour[s->offset[c] + i]], alone.mesh[0]->cell_global[t->neighbour[t->offset[other] + i]]);
-          RT_CHECK(boxes_same_bits(s->weight[s->offset[c] + i], t->weight[t->offset[other] + i], 3 * sizeof(double)));
-        }
-      }
-      boxes_close(&alone);
-      boxes_close(&w);
-    }
+  open_mesh(&w, MPI_COMM_WORLD, make(CROWDED), TM_RANDOM);
+  for (rm_lid c = 0; c < w.mesh[0]->num_cells; c++) RT_CHECK(w.stencil[0]->offset[c + 1] - w.stencil[0]->offset[c] < 140);
+  slopes_are_exact(&w, (double[]){0.0, -3.0, 5.0}, 4e-12); /* a cell is 240 times longer than wide */
+  boxes_close(&w);
+  check_bits_of_one_rank(CROWDED, TM_RANDOM);
 }
 
 static void inner_cells_of_a_grid_have_26_neighbours_and_8_nodes(void)
@@ -291,6 +308,7 @@ static void slopes_do_not_depend_on_the_unit(void)
 }
 
 RT_MAIN(RT_CASE(slopes_of_linear_fields_are_exact_on_every_kind_of_cell), RT_CASE(stencils_are_those_of_one_rank_bit_by_bit),
+        RT_CASE(cells_that_are_very_many_round_an_edge_have_few_neighbours_that_do),
         RT_CASE(inner_cells_of_a_grid_have_26_neighbours_and_8_nodes), RT_CASE(a_mesh_one_cell_thick_has_no_slope_across),
         RT_CASE(a_turned_mesh_one_cell_thick_has_no_slope_across), RT_CASE(a_single_cell_has_slope_zero),
         RT_CASE(thin_cells_reconstruct_linear_fields), RT_CASE(slopes_far_from_the_origin_are_as_good_as_the_coordinates),

@@ -7,7 +7,8 @@
 
 /* stencil -- least squares over vertex neighbours, prepared once per mesh. Neighbours on other ranks are found by the
  * coordinates of shared nodes. Read-only once built. Invariants:
- *   a cell's neighbours ascend canonically (centroid's Morton key, centroid, volume, global id), without the cell itself;
+ *   a cell's neighbours ascend canonically (centroid's Morton key, centroid, volume, global id), without the cell itself; of
+ *   the cells at a node with more than 512 they are about 130, chosen by that order: those next to the cell, others all round;
  *   weight holds, per neighbour, the vector w with gradient = sum of w (u_neighbour - u_cell), exact for linear fields wherever
  *   the neighbours' centroids span space; a direction they do not span has slope 0 (QR with column scaling and pivoting). */
 typedef struct rm_stencil {

@@ -3,10 +3,18 @@
  * Cells of one rank meet at nodes. Cells of other ranks are found in three exchanges: a node that lies in the box of another
  * rank's nodes is announced to the rank its coordinates hash to; that rank tells all who announced the same point of each
  * other; those send each other the cells around it. Nodes are told apart by coordinates alone, so what is found does not
- * depend on the partition. O(n) time and, for hexahedra, about 900 bytes per cell. */
+ * depend on the partition. O(n) time and, for hexahedra, about 900 bytes per cell.
+ *
+ * Around the axis of a mesh of revolution, and wherever else very many cells meet at one node, all with all would be n^2. Of
+ * the cells at such a node, in canonical order, each has as neighbours those next to it, which are mostly near it in space, and
+ * some that are spread over all, so that the distances span space as well as all of them do: a choice by coordinates alone. */
 #include "field_private.h"
 
 #include <stdlib.h>
+
+/* A node with more cells than CROWD, which are more than meshes have around inner vertices, is crowded; of its cells each sees
+ * NEXT on either side in canonical order, and SPREAD of all, or a few less. */
+enum { CROWD = 512, NEXT = 32, SPREAD = 64 };
 
 /* A node, at the rank its coordinates hash to. */
 typedef struct announcement {
@@ -39,6 +47,8 @@ typedef struct draft {
   rm_lid        *node_halo;        /* num_cells + place in the halo */
   int           *halo_rank;        /* [num_halo] */
   rm_lid        *halo_cell;
+  int64_t       *crowd_offset; /* [num_nodes + 1] */
+  rm_lid        *crowd;        /* of crowded nodes: places of all their cells in the canonical order, ascending */
   rm_lid         num_all; /* own cells, then the halo: */
   double (*centroid)[3];  /* [num_all]                 */
   double *volume;
@@ -320,32 +330,6 @@ static remap_status meet_other_ranks(draft *d, rm_stencil *stencil)
 
 /* ---- neighbours and weights ------------------------------------------------------------------------------------ */
 
-/* List the cells that share a node with a cell, each once, as places in the canonical order; last_cell is [num_all]. NULL out:
- * count only. */
-static int64_t neighbours_of_cell(const draft *d, const rm_stencil *stencil, rm_lid cell, const rm_lid *place,
-                                  rm_lid *last_cell, rm_lid *out)
-{
-  int64_t num = 0;
-
-  last_cell[cell] = cell + 1;
-  for (int64_t i = stencil->node_offset[cell]; i < stencil->node_offset[cell + 1]; i++) {
-    const rm_lid  node = stencil->node[i];
-    const int64_t own  = d->node_cell_offset[node + 1] - d->node_cell_offset[node];
-    const int64_t all  = own + d->node_halo_offset[node + 1] - d->node_halo_offset[node];
-
-    for (int64_t k = 0; k < all; k++) {
-      const rm_lid other =
-          k < own ? d->node_cell[d->node_cell_offset[node] + k] : d->node_halo[d->node_halo_offset[node] + k - own];
-
-      if (last_cell[other] == cell + 1) continue;
-      last_cell[other] = cell + 1;
-      if (out) out[num] = place[other];
-      num++;
-    }
-  }
-  return num;
-}
-
 static int compare_lids(const void *a, const void *b)
 {
   const rm_lid x = *(const rm_lid *)a, y = *(const rm_lid *)b;
@@ -368,6 +352,95 @@ static void sort_lids(rm_lid *data, int64_t n)
   }
 }
 
+/* How many cells there are at a node, of all ranks. */
+static int64_t num_at(const draft *d, rm_lid node)
+{
+  return d->node_cell_offset[node + 1] - d->node_cell_offset[node] + d->node_halo_offset[node + 1] - d->node_halo_offset[node];
+}
+
+/* Cell k of those at a node: own ones, then the halo's. */
+static rm_lid cell_at(const draft *d, rm_lid node, int64_t k)
+{
+  const int64_t own = d->node_cell_offset[node + 1] - d->node_cell_offset[node];
+
+  return k < own ? d->node_cell[d->node_cell_offset[node] + k] : d->node_halo[d->node_halo_offset[node] + k - own];
+}
+
+/* List the cells at crowded nodes. O(nodes + n log n) for n cells there. */
+static remap_status list_crowds(draft *d, const rm_lid *place)
+{
+  const rm_lid n = d->mesh->num_nodes;
+
+  RM_NEW(d->crowd_offset, d->scratch, (int64_t)n + 1);
+  for (rm_lid v = 0; v < n; v++) d->crowd_offset[v] = num_at(d, v) > CROWD ? num_at(d, v) : 0;
+  rm_offsets(d->crowd_offset, n);
+  RM_NEW(d->crowd, d->scratch, d->crowd_offset[n]);
+  for (rm_lid v = 0; v < n; v++) {
+    const int64_t first = d->crowd_offset[v], num = d->crowd_offset[v + 1] - first;
+
+    for (int64_t k = 0; k < num; k++) d->crowd[first + k] = place[cell_at(d, v, k)];
+    sort_lids(d->crowd + first, num);
+  }
+  return REMAP_OK;
+}
+
+/* Where a place stands in an ascending list, or would stand. */
+static int64_t find_lid(const rm_lid *list, int64_t n, rm_lid wanted)
+{
+  int64_t low = 0;
+
+  while (n > 0) {
+    const int64_t half = n / 2;
+
+    if (list[low + half] < wanted) low += half + 1, n -= half + 1;
+    else n = half;
+  }
+  return low;
+}
+
+/* A list of neighbours in the making, of a cell: places in the canonical order, each once. */
+typedef struct listing {
+  rm_lid  cell, *last_cell; /* [num_all] by place: 1 + the cell that took it last */
+  rm_lid *out;              /* NULL: they are only counted */
+  int64_t num;
+} listing;
+
+static void take(listing *l, rm_lid place)
+{
+  if (l->last_cell[place] == l->cell + 1) return;
+  l->last_cell[place] = l->cell + 1;
+  if (l->out) l->out[l->num] = place;
+  l->num++;
+}
+
+/* Of the cells at a crowded node, which stand at `crowd`: those next to place `own`, and one in so many. */
+static void take_of_crowd(listing *l, const rm_lid *crowd, int64_t num, rm_lid own)
+{
+  const int64_t at = find_lid(crowd, num, own), step = (num + SPREAD - 1) / SPREAD;
+
+  for (int64_t k = at > NEXT ? at - NEXT : 0; k < num && k <= at + NEXT; k++) take(l, crowd[k]);
+  for (int64_t k = 0; k < num; k += step) take(l, crowd[k]);
+}
+
+/* List the neighbours of a cell as places in the canonical order. last_cell is [num_all], out has room; NULL: count only. */
+static int64_t neighbours_of_cell(const draft *d, const rm_stencil *stencil, rm_lid cell, const rm_lid *place,
+                                  rm_lid *last_cell, rm_lid *out)
+{
+  listing l = {.cell = cell, .last_cell = last_cell, .out = out};
+
+  last_cell[place[cell]] = cell + 1;
+  for (int64_t i = stencil->node_offset[cell]; i < stencil->node_offset[cell + 1]; i++) {
+    const rm_lid  node  = stencil->node[i];
+    const int64_t first = d->crowd_offset[node], num = d->crowd_offset[node + 1] - first;
+
+    if (num > 0)
+      take_of_crowd(&l, d->crowd + first, num, place[cell]);
+    else
+      for (int64_t k = 0; k < num_at(d, node); k++) take(&l, place[cell_at(d, node, k)]);
+  }
+  return l.num;
+}
+
 static remap_status list_neighbours(draft *d, const rm_frame *frame, rm_stencil *stencil)
 {
   const rm_lid n = stencil->num_cells;
@@ -380,6 +453,7 @@ static remap_status list_neighbours(draft *d, const rm_frame *frame, rm_stencil 
   RM_NEW(offset, d->arena, (int64_t)n + 1);
   RM_TRY(rm_canonical_order(d->scratch, frame, d->num_all, (const double(*)[3])d->centroid, d->volume, d->global, order));
   for (rm_lid k = 0; k < d->num_all; k++) place[order[k]] = k;
+  RM_TRY(list_crowds(d, place));
   for (rm_lid c = 0; c < n; c++) offset[c] = neighbours_of_cell(d, stencil, c, place, last_cell, NULL);
   rm_offsets(offset, n);
   RM_NEW(neighbour, d->arena, offset[n]);
