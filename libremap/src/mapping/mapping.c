@@ -4,23 +4,38 @@
  *   (i, j, V, M)  ----->   j | i1 i2 i3 ...       serves source to target
  *        \------------->   i | j1 j2 ...          serves target to source, moments about c_j
  *
- * Each pair travels twice, as one record of 96 bytes, in one exchange per direction; its second moments, where there are any,
- * in another. A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the
- * pairs were made. O(p) time and memory for p pairs. */
+ * Each pair travels twice, as one record of 48 bytes, in one exchange per direction; what is to be known of a giving cell goes
+ * once from an overlay rank to a home, in another of as many bytes per cell; second moments, where there are any, in a third.
+ * A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the pairs were
+ * made. O(p) time and memory for p pairs. */
 #include "mapping.h"
 
 #include <string.h>
 
 /* A pair on its way to the home of its receiving cell. */
 typedef struct pair_record {
-  double  volume, moment[3]; /* about the giver's centroid */
-  double  giver_centroid[3], giver_volume;
-  rm_gid  giver_global;
-  rm_lid  giver_cell, receiver; /* numbers at their homes */
-  int32_t giver_rank;
-  int16_t is_cut;   /* not 0: the skin of the giving mesh passes through the receiver */
-  int16_t is_empty; /* not 0: the giver has no volume; no pair, but its skin counts   */
+  double  volume, moment[3]; /* about the giver's centroid                                                             */
+  rm_lid  receiver;          /* its number at home                                                                     */
+  rm_lid  giver;             /* place in the sender's list for that home; -1: without volume, no pair, but its skin counts */
+  int32_t is_cut;            /* not 0: the skin of the giving mesh passes through the receiver                         */
+  int32_t unused;            /* no padding on the wire                                                                 */
 } pair_record;
+
+/* A giving cell on its way to the home of cells that it gives to. */
+typedef struct giver_record {
+  double  centroid[3], volume;
+  rm_gid  global;
+  rm_lid  cell; /* its number at its own home */
+  int32_t rank; /* that home                  */
+} giver_record;
+
+/* What goes out to, or came from, each rank in turn. */
+typedef struct shipment {
+  int64_t      *pair_offset, *giver_offset; /* [comm->size + 1]                                          */
+  pair_record  *pair;                       /* [pair_offset[comm->size]]                                 */
+  giver_record *giver;                      /* [giver_offset[comm->size]]                                */
+  double      (*second)[6];                 /* of each pair, about the giver's centroid; NULL: none      */
+} shipment;
 
 /* A side's rows while they are filled: the arrays of rm_rows, writable. */
 typedef struct rows_draft {
@@ -36,48 +51,115 @@ typedef struct rows_draft {
   double (*giver_centroid)[3];
 } rows_draft;
 
-/* The pairs of a piece as records, grouped by the home of the receiving cell, and their second moments in the same order, NULL
- * if there are none; offset is [comm->size + 1]. */
-static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                               remap_side receiving, int64_t *offset, pair_record **out, double (**out_second)[6])
+/* Both sides of the pairs of a part, one of which receives. */
+typedef struct giving {
+  const rm_piece *to, *from;
+  const rm_lid   *receiver, *giver;   /* [pairs] cells of these                                */
+  int             skin;               /* flag of a pair through whose receiver the skin passes */
+  const double  (*second)[6];         /* [pairs] NULL: none                                    */
+  bool            backward;
+} giving;
+
+static giving giving_to(remap_side receiving, const rm_part *part, const rm_moments *moments)
 {
-  const bool      backward = receiving == REMAP_SOURCE;
-  const rm_piece *to = &part->piece[receiving], *from = &part->piece[backward ? REMAP_TARGET : REMAP_SOURCE];
-  const rm_lid *receiver = backward ? moments->source : moments->target, *giver = backward ? moments->target : moments->source;
-  const int     skin = backward ? RM_PAIR_TARGET_SKIN : RM_PAIR_SOURCE_SKIN;
-  const double (*given_second)[6] = backward ? moments->second_back : moments->second;
-  pair_record  *record;
-  int64_t      *next;
-  double(*second)[6] = NULL;
+  if (receiving == REMAP_TARGET)
+    return (giving){&part->piece[1], &part->piece[0], moments->target, moments->source, RM_PAIR_SOURCE_SKIN, moments->second,
+                    false};
+  return (giving){&part->piece[0], &part->piece[1], moments->source, moments->target, RM_PAIR_TARGET_SKIN, moments->second_back,
+                  true};
+}
 
-  RM_NEW(record, scratch, moments->num_pairs);
-  if (given_second) RM_NEW(second, scratch, moments->num_pairs);
+/* List the pairs by the home of the receiving cell, their order kept: pair_offset, and place [pairs] of each record. */
+static remap_status sort_by_home(rm_arena *scratch, const rm_comm *comm, const giving *g, int64_t n, int64_t *pair_offset,
+                                 int64_t **place)
+{
+  int64_t *next;
+
+  RM_NEW(*place, scratch, n);
   RM_NEW(next, scratch, (int64_t)comm->size + 1);
-  for (int r = 0; r <= comm->size; r++) offset[r] = 0;
-  for (int64_t k = 0; k < moments->num_pairs; k++) offset[to->cell_home_rank[receiver[k]]]++;
-  rm_offsets(offset, comm->size);
-  for (int r = 0; r < comm->size; r++) next[r] = offset[r];
-  for (int64_t k = 0; k < moments->num_pairs; k++) {
-    const rm_lid  i = giver[k], j = receiver[k];
-    const double *c = from->cell_centroid[i];
-    const int64_t at = next[to->cell_home_rank[j]]++;
-    pair_record  *p  = &record[at];
+  for (int r = 0; r <= comm->size; r++) pair_offset[r] = 0;
+  for (int64_t k = 0; k < n; k++) pair_offset[g->to->cell_home_rank[g->receiver[k]]]++;
+  rm_offsets(pair_offset, comm->size);
+  for (int r = 0; r < comm->size; r++) next[r] = pair_offset[r];
+  for (int64_t k = 0; k < n; k++) (*place)[next[g->to->cell_home_rank[g->receiver[k]]]++] = k;
+  return REMAP_OK;
+}
 
-    *p = (pair_record){.volume         = moments->volume[k],
-                       .giver_centroid = {c[0], c[1], c[2]},
-                       .giver_volume   = from->cell_volume[i],
-                       .giver_global   = from->cell_global[i],
-                       .giver_cell     = from->cell_home[i],
-                       .receiver       = to->cell_home[j],
-                       .giver_rank     = from->cell_home_rank[i],
-                       .is_cut         = (moments->flags[k] & skin) != 0,
-                       .is_empty       = (moments->flags[k] & RM_PAIR_EMPTY) != 0};
-    for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
-      p->moment[d] = moments->moment[k][d] + (backward ? (to->cell_centroid[j][d] - c[d]) * p->volume : 0.0);
-    for (int d = 0; d < 6 && second; d++) second[at][d] = given_second[k][d];
+/* The pair's record but for its giver. */
+static pair_record record_of(const giving *g, const rm_moments *moments, int64_t k)
+{
+  const rm_lid  i = g->giver[k], j = g->receiver[k];
+  const double *c = g->from->cell_centroid[i];
+  pair_record   p = {.volume   = moments->volume[k],
+                     .receiver = g->to->cell_home[j],
+                     .giver    = -1,
+                     .is_cut   = (moments->flags[k] & g->skin) != 0};
+
+  for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
+    p.moment[d] = moments->moment[k][d] + (g->backward ? (g->to->cell_centroid[j][d] - c[d]) * p.volume : 0.0);
+  return p;
+}
+
+/* The pairs of a part as they leave, and for each home the cells that give there, once. */
+static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
+                               remap_side receiving, shipment *out)
+{
+  const giving    g = giving_to(receiving, part, moments);
+  const rm_piece *from = g.from;
+  const int64_t   n    = moments->num_pairs;
+  int64_t        *order, *place, num = 0; /* place of a cell among the givers so far, -1 */
+  rm_lid         *cell;
+
+  RM_TRY(sort_by_home(scratch, comm, &g, n, out->pair_offset, &order));
+  RM_NEW(out->pair, scratch, n);
+  if (g.second) RM_NEW(out->second, scratch, n);
+  RM_NEW(cell, scratch, n);
+  RM_NEW(place, scratch, from->num_cells);
+  for (rm_lid c = 0; c < from->num_cells; c++) place[c] = -1;
+  for (int r = 0; r < comm->size; r++) {
+    out->giver_offset[r] = num;
+    for (int64_t at = out->pair_offset[r]; at < out->pair_offset[r + 1]; at++) {
+      const int64_t k = order[at];
+      int64_t      *seen = &place[g.giver[k]];
+
+      out->pair[at] = record_of(&g, moments, k);
+      for (int d = 0; d < 6 && g.second; d++) out->second[at][d] = g.second[k][d];
+      if (moments->flags[k] & RM_PAIR_EMPTY) continue;
+      if (*seen < out->giver_offset[r]) cell[*seen = num++] = g.giver[k];
+      out->pair[at].giver = (rm_lid)(*seen - out->giver_offset[r]);
+    }
   }
-  *out        = record;
-  *out_second = second;
+  out->giver_offset[comm->size] = num;
+  RM_NEW(out->giver, scratch, num);
+  for (int64_t k = 0; k < num; k++) {
+    const double *c = from->cell_centroid[cell[k]];
+
+    out->giver[k] = (giver_record){{c[0], c[1], c[2]},           from->cell_volume[cell[k]],    from->cell_global[cell[k]],
+                                   from->cell_home[cell[k]], from->cell_home_rank[cell[k]]};
+  }
+  return REMAP_OK;
+}
+
+static remap_status new_offsets(rm_arena *arena, const rm_comm *comm, shipment *out)
+{
+  if (!arena) return REMAP_NO_MEMORY;
+  RM_NEW(out->pair_offset, arena, (int64_t)comm->size + 1);
+  RM_NEW(out->giver_offset, arena, (int64_t)comm->size + 1);
+  return REMAP_OK;
+}
+
+/* Send it all. Collective. What arrives lives in arena. */
+static remap_status ship(rm_arena *arena, const rm_comm *comm, const shipment *out, bool has_second, shipment *in)
+{
+  void *recv;
+
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->pair, out->pair_offset, out->pair, in->pair_offset, &recv));
+  in->pair = recv;
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->giver, out->giver_offset, out->giver, in->giver_offset, &recv));
+  in->giver = recv;
+  if (!has_second) return REMAP_OK;
+  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->second, out->pair_offset, out->second, in->pair_offset, &recv));
+  in->second = recv;
   return REMAP_OK;
 }
 
@@ -95,56 +177,73 @@ static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pai
   return REMAP_OK;
 }
 
-/* List every giver once, by rank and number there; giver_of_record [n] receives its place in the list. keyed is [2 n]. */
-static remap_status list_givers(rm_arena *arena, rm_keyed *keyed, int64_t n, const pair_record *record, rows_draft *draft,
-                                rm_rows *rows, rm_lid *giver_of_record)
+/* Put the givers that came, of which several senders may have sent the same, into the rows' list, each once, and the pairs'
+ * numbers for them into that list's. */
+static remap_status list_givers(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, shipment *in, rows_draft *draft,
+                                rm_rows *rows, double **volume)
 {
-  int64_t num = 0;
+  const int64_t n = in->giver_offset[comm->size];
+  int64_t       num = 0;
+  rm_keyed     *keyed, *spare;
+  rm_lid       *number;
 
+  RM_NEW(keyed, scratch, n);
+  RM_NEW(spare, scratch, n);
+  RM_NEW(number, scratch, n);
   for (int64_t k = 0; k < n; k++)
-    keyed[k] = (rm_keyed){(uint64_t)record[k].giver_rank << 32 | (uint64_t)record[k].giver_cell, k};
-  rm_sort_keyed(keyed, keyed + n, n);
+    keyed[k] = (rm_keyed){(uint64_t)in->giver[k].rank << 32 | (uint64_t)in->giver[k].cell, k};
+  rm_sort_keyed(keyed, spare, n);
   for (int64_t k = 0; k < n; k++) {
     num += k == 0 || keyed[k].key != keyed[k - 1].key;
-    giver_of_record[keyed[k].item] = (rm_lid)(num - 1);
+    number[keyed[k].item] = (rm_lid)(num - 1);
   }
   rows->num_givers = (rm_lid)num;
   RM_NEW(draft->giver_rank, arena, num);
   RM_NEW(draft->giver_cell, arena, num);
   RM_NEW(draft->giver_global, arena, num);
   RM_NEW(draft->giver_centroid, arena, num);
+  RM_NEW(*volume, scratch, num);
   for (int64_t k = 0; k < n; k++) {
-    const rm_lid g = giver_of_record[k];
+    const giver_record *from = &in->giver[k];
+    const rm_lid        g    = number[k];
 
-    draft->giver_rank[g]   = record[k].giver_rank;
-    draft->giver_cell[g]   = record[k].giver_cell;
-    draft->giver_global[g] = record[k].giver_global;
-    for (int d = 0; d < 3; d++) draft->giver_centroid[g][d] = record[k].giver_centroid[d];
+    draft->giver_rank[g]   = from->rank;
+    draft->giver_cell[g]   = from->cell;
+    draft->giver_global[g] = from->global;
+    (*volume)[g]           = from->volume;
+    for (int d = 0; d < 3; d++) draft->giver_centroid[g][d] = from->centroid[d];
   }
+  for (int r = 0; r < comm->size; r++)
+    for (int64_t k = in->pair_offset[r]; k < in->pair_offset[r + 1]; k++)
+      if (in->pair[k].giver >= 0) in->pair[k].giver = number[in->giver_offset[r] + in->pair[k].giver];
   return REMAP_OK;
 }
 
-/* Records sorted by receiver and, within, by the canonical order of the givers: place [n] lists them so. keyed is [2 n]. */
-static remap_status sort_rows(rm_arena *scratch, rm_keyed *keyed, const rm_frame *frame, int64_t n, const pair_record *record,
-                              const rm_lid *giver_of_record, const rows_draft *draft, const rm_rows *rows, int64_t *place)
+/* Records sorted by receiver and, within, by the canonical order of the givers, whose volumes are given: place [n] lists them
+ * so. Both by counting. */
+static remap_status sort_rows(rm_arena *scratch, const rm_frame *frame, int64_t n, const pair_record *record,
+                              const double *volume, const rows_draft *draft, const rm_rows *rows, rm_lid *place)
 {
   const rm_lid num = rows->num_givers;
-  double      *volume; /* of the givers */
-  rm_lid      *order, *rank_of_giver;
-  int64_t     *next;
+  rm_lid      *order, *by_giver;
+  int64_t     *end, *next, at = 0;
 
-  RM_NEW(volume, scratch, num);
   RM_NEW(order, scratch, num);
-  RM_NEW(rank_of_giver, scratch, num);
+  RM_NEW(by_giver, scratch, n);
+  RM_NEW0(end, scratch, num);
   RM_NEW(next, scratch, rows->num_cells);
-  for (int64_t k = 0; k < n; k++) volume[giver_of_record[k]] = record[k].giver_volume;
   RM_TRY(
       rm_canonical_order(scratch, frame, num, (const double(*)[3])draft->giver_centroid, volume, draft->giver_global, order));
-  for (rm_lid k = 0; k < num; k++) rank_of_giver[order[k]] = k;
-  for (int64_t k = 0; k < n; k++) keyed[k] = (rm_keyed){(uint64_t)rank_of_giver[giver_of_record[k]], k};
-  rm_sort_keyed(keyed, keyed + n, n);
+  for (int64_t k = 0; k < n; k++) end[record[k].giver]++;
+  for (rm_lid k = 0; k < num; k++) {
+    const int64_t count = end[order[k]];
+
+    end[order[k]] = at;
+    at += count;
+  }
+  for (int64_t k = 0; k < n; k++) by_giver[end[record[k].giver]++] = (rm_lid)k;
   for (rm_lid c = 0; c < rows->num_cells; c++) next[c] = draft->offset[c];
-  for (int64_t k = 0; k < n; k++) place[next[record[keyed[k].item].receiver]++] = keyed[k].item;
+  for (int64_t k = 0; k < n; k++) place[next[record[by_giver[k]].receiver]++] = by_giver[k];
   return REMAP_OK;
 }
 
@@ -156,9 +255,12 @@ static int64_t mark_cut(int64_t n, pair_record *record, double (*second)[6], uin
 
   for (int64_t k = 0; k < n; k++) {
     is_cut[record[k].receiver] |= record[k].is_cut != 0;
-    if (record[k].is_empty) continue;
-    if (second) memmove(second[kept], second[k], sizeof *second);
-    record[kept++] = record[k];
+    if (record[k].giver < 0) continue;
+    if (kept < k) {
+      if (second) memcpy(second[kept], second[k], sizeof *second);
+      record[kept] = record[k];
+    }
+    kept++;
   }
   return kept;
 }
@@ -179,40 +281,38 @@ static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_vo
   return rint(rm_compensated_value(&sum) / cell_volume) == 1.0 ? REMAP_COVERED : REMAP_PARTIAL;
 }
 
-/* Rows of one side out of the records that came, with their second moments (NULL: none); both are reordered. What stays to be
- * filled in is `same` and the plan. */
-static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_frame *frame, const rm_mesh *mesh, int64_t n,
-                              pair_record *record, double (*second)[6], rows_draft *draft, rm_rows *rows, rm_reason *reason)
+/* Rows of one side out of what came, which is reordered. What stays to be filled in is `same` and the plan. */
+static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
+                              const rm_mesh *mesh, shipment *in, rows_draft *draft, rm_rows *rows, rm_reason *reason)
 {
-  rm_lid   *giver_of_record;
-  int64_t  *place;
-  uint8_t  *is_cut;
-  rm_keyed *keyed;
+  const pair_record *record = in->pair;
+  int64_t            n      = in->pair_offset[comm->size];
+  double            *volume;
+  rm_lid            *place;
+  uint8_t           *is_cut;
 
   if (n > INT32_MAX)
     return rm_fail(REMAP_TOO_LARGE, reason, mesh->side, -1, "%lld pairs come to one rank; use more ranks", (long long)n);
   rows->num_cells = mesh->num_cells;
   RM_NEW0(is_cut, scratch, mesh->num_cells);
-  n = mark_cut(n, record, second, is_cut);
-  RM_TRY(new_rows(arena, mesh->num_cells, n, second != NULL, draft));
-  RM_NEW(giver_of_record, scratch, n);
+  RM_TRY(list_givers(arena, scratch, comm, in, draft, rows, &volume));
+  n = mark_cut(n, in->pair, in->second, is_cut);
+  RM_TRY(new_rows(arena, mesh->num_cells, n, in->second != NULL, draft));
   RM_NEW(place, scratch, n);
-  RM_NEW(keyed, scratch, 2 * n);
   for (int64_t k = 0; k < n; k++) {
     RM_ASSERT(record[k].receiver >= 0 && record[k].receiver < mesh->num_cells);
     draft->offset[record[k].receiver]++;
   }
   rm_offsets(draft->offset, mesh->num_cells);
-  RM_TRY(list_givers(arena, keyed, n, record, draft, rows, giver_of_record));
-  RM_TRY(sort_rows(scratch, keyed, frame, n, record, giver_of_record, draft, rows, place));
+  RM_TRY(sort_rows(scratch, frame, n, record, volume, draft, rows, place));
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
     for (int64_t k = draft->offset[c]; k < draft->offset[c + 1]; k++) {
       const pair_record *p = &record[place[k]];
 
-      draft->giver[k]  = giver_of_record[place[k]];
+      draft->giver[k]  = p->giver;
       draft->volume[k] = p->volume;
       for (int d = 0; d < 3; d++) draft->moment[k][d] = p->moment[d];
-      for (int d = 0; d < 6 && second; d++) draft->second[k][d] = second[place[k]][d];
+      for (int d = 0; d < 6 && in->second; d++) draft->second[k][d] = in->second[place[k]][d];
     }
     if (draft->offset[c] == draft->offset[c + 1]) continue; /* uncovered */
     draft->cover[c] = (uint8_t)cover_of(draft, c, mesh->cell_volume[c], is_cut[c] != 0);
@@ -242,23 +342,16 @@ static remap_status bring_home(rm_arena *arena, const rm_comm *comm, const rm_fr
                                rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new(), *leaving = rm_arena_new(); /* leaving: what is sent */
-  int64_t     *send_offset = leaving ? rm_arena_alloc(leaving, (int64_t)comm->size + 1, sizeof *send_offset) : NULL;
-  int64_t     *recv_offset = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *recv_offset) : NULL;
-  pair_record *send        = NULL;
-  void        *recv = NULL, *recv_second = NULL;
-  double(*send_second)[6]  = NULL;
-  remap_status status      = REMAP_NO_MEMORY;
+  shipment     out = {.second = NULL}, in = {.second = NULL};
+  remap_status status = new_offsets(leaving, comm, &out);
 
-  if (send_offset && recv_offset)
-    status = pack_pairs(leaving, comm, part, moments, mesh->side, send_offset, &send, &send_second);
+  if (status == REMAP_OK) status = new_offsets(scratch, comm, &in);
+  if (status == REMAP_OK) status = pack_pairs(leaving, comm, part, moments, mesh->side, &out);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = rm_comm_exchange(comm, scratch, sizeof *send, send_offset, send, recv_offset, &recv));
-  if (moments->second)
-    RM_GOTO(done,
-            status = rm_comm_exchange(comm, scratch, sizeof *send_second, send_offset, send_second, recv_offset, &recv_second));
+  RM_GOTO(done, status = ship(scratch, comm, &out, moments->second != NULL, &in));
   rm_arena_drop(leaving);
   leaving = NULL;
-  status  = fill_rows(arena, scratch, frame, mesh, recv_offset[comm->size], recv, recv_second, draft, rows, reason);
+  status  = fill_rows(arena, scratch, comm, frame, mesh, &in, draft, rows, reason);
   RM_GOTO(done, status = rm_comm_agree_reason(comm, status, reason));
   publish(draft, rows);
   status = rm_plan_build(comm, arena, rows->num_givers, rows->giver_rank, rows->giver_cell, &rows->plan);
