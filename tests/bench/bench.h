@@ -5,8 +5,10 @@
  *   finer        likewise on (2N)^3
  *   identical    N^3 warped hexahedra on themselves          nested     N^3 boxes on (2N)^3
  *   shifted      N^3 boxes, half a cell apart                abutting   N^3 boxes beside N^3 boxes
- *   boxes        N^3 boxes, rotated, inside (2N)^3           tetrahedra 6 N^3, warped, rotated, inside 6 (2N)^3
- *   dual         duals of such tetrahedra                    pancakes   as general, all 10^4 times thinner in z, rotated
+ *   boxes        N^3 cubes, rotated and moved by rational numbers, inside (2N)^3 of that size: all faces exactly planar, the
+ *                meshes in general position to each other
+ *   tetrahedra   6 N^3, warped, rotated, inside 6 (2N)^3     dual       duals of such tetrahedra
+ *   pancakes     as general, all 10^4 times thinner in z, rotated
  *   graded       as general, edges growing 1000 times along x, y and z
  *   layer        as general over a wavy wall, cells growing 10^4 times away from it
  *   surface      a ball of 8 N^2 triangles as one cell on 16^3 warped hexahedra    itself   that ball on itself
@@ -123,6 +125,25 @@ static inline tm_mesh *bench_placed_(tm_mesh *mesh, double angle, double scale)
   return mesh;
 }
 
+/* Cubes of edge 2 BENCH_EDGE on the lattice, n of them along each side about the origin; turned by the rotation of quaternion
+ * (13, 2, 1, 3), which is rational with denominator BENCH_EDGE, and moved. All coordinates are exact. */
+enum { BENCH_EDGE = 13 * 13 + 2 * 2 + 1 + 3 * 3 };
+typedef struct bench_cubes_ {
+  int  n;
+  bool turned;
+} bench_cubes_;
+static inline void bench_cube_(double xyz[3], const void *data)
+{
+  static const double turn[3][3] = {{163, -74, 38}, {82, 157, -46}, {-14, 58, 173}};
+  static const double move[3]    = {37 + 311 / 1024., 101 + 717 / 1024., -59 - 103 / 1024.};
+  const bench_cubes_ *cubes      = data;
+  double              at[3];
+
+  for (int d = 0; d < 3; d++) at[d] = 2 * rint(xyz[d] * cubes->n) - cubes->n;
+  for (int d = 0; d < 3; d++)
+    xyz[d] = cubes->turned ? turn[d][0] * at[0] + turn[d][1] * at[1] + turn[d][2] * at[2] + move[d] : BENCH_EDGE * at[d];
+}
+
 /* Along each axis, lengths grow 1000 times. */
 static inline void bench_grade_(double xyz[3], const void *data)
 {
@@ -186,8 +207,8 @@ static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
     const double by = shifted ? .5 / n : 1, m[12] = {1, 0, 0, by, 0, 1, 0, shifted ? by : 0, 0, 0, 1, shifted ? by : 0};
     mesh[0] = tm_hexahedra(coarse, NULL, NULL), mesh[1] = tm_hexahedra(coarse, tm_affine, m);
   } else if (!strcmp(name, "boxes")) {
-    mesh[0] = bench_placed_(tm_hexahedra(coarse, NULL, NULL), .3, .5),
-    mesh[1] = bench_placed_(tm_hexahedra(fine, NULL, NULL), 0, 1);
+    mesh[0] = tm_hexahedra(coarse, bench_cube_, &(bench_cubes_){n, true});
+    mesh[1] = tm_hexahedra(fine, bench_cube_, &(bench_cubes_){2 * n, false});
   } else if (!strcmp(name, "tetrahedra") || !strcmp(name, "dual")) {
     bench_maker_ *make = name[0] == 't' ? tm_tetrahedra : tm_dual;
     mesh[0] = bench_placed_(make(coarse, tm_warp, &first), .3, .5), mesh[1] = bench_placed_(make(fine, tm_warp, &second), 0, 1);

@@ -85,6 +85,7 @@ static laid *lay(const tm_mesh *source, const tm_mesh *target, remap_faces faces
   for (int side = 0; side < 2 && l->status == REMAP_OK; side++) {
     laid_piece_(l, whole[side], side, &plain);
     l->status = rm_trimesh_build(l->arena, &l->frame, &l->part.piece[side], faces, &l->mesh[side]);
+    if (l->status == REMAP_OK) l->status = rm_cells_mesh(l->arena, &l->frame, l->mesh[side], &l->mesh[side]);
   }
   return l;
 }

@@ -413,12 +413,17 @@ static void memory_that_runs_out_is_told(void)
   laid        *l = laid_over(a, b, REMAP_FACES_CENTRE, NULL);
   remap_status status = REMAP_NO_MEMORY;
   int64_t      n      = 0;
+  const rm_trimesh *mesh[2];
+  const rm_overlay *o = NULL;
+
+  for (int side = 0; side < 2; side++) RT_EQ(rm_cells_mesh(l->arena, &l->frame, l->mesh[side], &mesh[side]), REMAP_OK);
+  RT_EQ(rm_overlay_build(l->arena, mesh, &l->part, NULL, &o, NULL), REMAP_OK);
 
   while (status == REMAP_NO_MEMORY && n < 100) {
     rm_arena       *arena = rm_arena_new();
     const rm_cells *cells = NULL;
     rm_arena_fail_at(arena, ++n);
-    status = rm_cells_build(arena, &l->part, l->overlay, NULL, &(rm_cells_choice){.keep = SUPER_UNION}, &cells, NULL);
+    status = rm_cells_build(arena, &l->part, o, NULL, &(rm_cells_choice){.keep = SUPER_UNION}, &cells, NULL);
     RT_CHECK((cells != NULL) == (status == REMAP_OK));
     rm_arena_drop(arena);
   }

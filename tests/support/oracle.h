@@ -213,12 +213,12 @@ static inline void oracle_check_crossings(oracle *o, int side)
     const rm_crossing *list  = trace->crossing + trace->first[e];
     rm_lid             found = 0;
 
-    for (rm_lid t = 0; t < other->num_triangles; t++) {
+    for (rm_lid t = 0; t < other->num_triangles && !rm_is_inside_facets(own, e); t++) {
       const int s      = oracle_crosses_(o, side, e, t);
       bool      listed = false;
 
       if (!s) continue;
-      for (rm_lid k = 0; k < trace->count[e]; k++) listed |= list[k].triangle == 2 * t + (s < 0);
+      for (rm_lid k = 0; k < trace->count[e]; k++) listed |= list[k].triangle == (rm_facet_of(other, t) ^ (s < 0));
       wrong += !listed;
       found++;
     }

@@ -75,15 +75,16 @@ static inline const rm_lid *rm_cells_beyond(const rm_cells *cells, rm_lid f)
 /* False if the corners of triangle t are on a line. Exact. Not collective. */
 bool rm_has_area(const rm_trimesh *m, rm_lid t);
 
-/* The triangulation without flat triangles, which have their corners on a line: they are left out, and others are cut where
- * such a one had a vertex on their edge, so that what is left is conformal and bounds the same volumes. *out is mesh itself
- * if it has none; triangle_face stays that of mesh. Not collective. Lives in arena. NO_MEMORY, TOO_LARGE. */
+/* The triangulation that cells are made of: every triangle a facet of its own, and none flat, with its corners on a line: these
+ * are left out, and others are cut where such a one had a vertex on their edge, so that what is left is conformal and bounds
+ * the same volumes. *out is mesh itself if it is like that; triangle_face stays that of mesh. Not collective. Lives in arena.
+ * NO_MEMORY, TOO_LARGE. */
 remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out);
 
 /* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
  * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH
  * with the cell and the reason if cells of one mesh overlap or cross each other; TOO_LARGE from 2^30 polygons on. The meshes
- * of the overlay have no flat triangles: see rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but
+ * of the overlay are those of rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but
  * not its meshes: it is dropped, and NULL then, as soon as it is used up. O(n log n) in crossings, n^2 in the vertices of a
  * face with holes. */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,

@@ -264,6 +264,7 @@ remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trim
     any          = any || w.is_flat[t];
   }
   if (status == REMAP_OK && any) status = rebuild(arena, frame, &w, &mesh);
+  if (status == REMAP_OK && mesh->facet) status = rm_trimesh_of_triangles(arena, mesh, &mesh);
   free(w.inner);
   free(w.corner);
   free(w.old);

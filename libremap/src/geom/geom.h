@@ -61,6 +61,11 @@ enum { RM_CENTRE_POINT = -1 }; /* stands for the mean of the face's vertices in 
  * left, a fan from the canonical first vertex. O(n^2) worst case, O(n) for quadrangles; no triangle has a corner twice. */
 int rm_triangulate(const double (*xyz)[3], int n, remap_faces faces, int *corner, double centre[3], int *work);
 
+/* True if the points lie in one plane and their loop is the boundary of a convex polygon; straight angles are allowed, repeated
+ * points are not. Exact. rm_triangulate makes n - 2 triangles of it, all with area and of the loop's orientation, without the
+ * mean. O(n); 10 ns where the fourth point is off the plane. */
+bool rm_is_planar_convex(const double (*xyz)[3], int n);
+
 /* ---- double-double ------------------------------------------------------------------------------------------------ */
 
 typedef struct rm_dd { double hi, lo; } rm_dd;

@@ -225,6 +225,36 @@ static bool coplanar(const double (*xyz)[3], const int *vertex, int n)
   return true;
 }
 
+/* +1 or -1 by which way p -> q runs along the first of the two axes beside `axis` on which the points differ; 0 if on none. */
+static inline int heading(const double p[3], const double q[3], int axis)
+{
+  const int x = (axis + 1) % 3, y = (axis + 2) % 3, sign = rm_sign(q[x] - p[x]);
+  return sign ? sign : rm_sign(q[y] - p[y]);
+}
+
+/* A loop is the boundary of a convex polygon if it never turns right, or never left, and goes round once: then its heading
+ * changes twice. */
+bool rm_is_planar_convex(const double (*xyz)[3], int n)
+{
+  int third = 2, axis = 0, way = 0, changes = 0;
+
+  if (n > 3 && rm_orient3d(xyz[0], xyz[1], xyz[2], xyz[3])) return false; /* as where faces are warped */
+  while (third < n && collinear(xyz[0], xyz[1], xyz[third])) third++;
+  if (third >= n) return false;
+  for (int i = third == 2 ? 4 : 2; i < n; i++)
+    if (i != third && rm_orient3d(xyz[0], xyz[1], xyz[third], xyz[i])) return false;
+  while (!rm_cross_sign(xyz[0], xyz[1], xyz[0], xyz[third], axis)) axis++;
+  for (int i = 0; i < n; i++) {
+    const double *p = xyz[i], *q = xyz[(i + 1) % n], *r = xyz[(i + 2) % n];
+    const int     side = rm_cross_sign(p, q, q, r, axis), from = heading(p, q, axis), to = heading(q, r, axis);
+
+    if (!from || (side && way && side != way)) return false;
+    way = side ? side : way;
+    changes += from != to;
+  }
+  return changes == 2;
+}
+
 /* The rule of DESIGN 2.1. ear is scratch, [total]. */
 static inline int triangulate_parts(sink *out, const face_parts *face, remap_faces faces, double centre[3], int *ear)
 {

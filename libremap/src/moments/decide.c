@@ -6,8 +6,8 @@
  * area, or has. A body has faces in four planes at least; where fewer are left there is none. Where four or more are left,
  * the sum is taken exactly.
  *
- * Points are told from each other by what they lie on, not by numbers: a vertex, a pair of edges that cross, or a triangle and
- * the edge that crosses it. So where planes coincide, a polygon between two of them is seen to have shrunk to a line.
+ * Points are told from each other by what they lie on, not by numbers: a vertex, a pair of edges that cross, or a facet and the
+ * edge that crosses it. So where planes coincide, a polygon between two of them is seen to have shrunk to a line.
  *
  * All of it holds for any cells, inverted and tangled ones too. O(sides log sides) where the sides cancel, which they do on
  * identical, nested and abutting meshes; exact sums cost as rational.c says. */
@@ -74,22 +74,48 @@ int rm_moments_axis(const rm_trimesh *m, rm_lid t)
 
 /* ---- limits: where the crossings are without simulation of simplicity ---------------------------------------------------- */
 
-/* Where a crossing lies exactly: nowhere in particular, at end h of its edge, at corner h of its triangle, on side h of it. */
-enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2, AT_SIDE = AT_CORNER + 3 };
+/* Where a crossing lies exactly: nowhere in particular, at end h of its edge; at corner h of the k-th triangle of its facet
+ * (AT_CORNER + 3 k + h), on side h of that one (AT_SIDE + 3 k + h). */
+enum { AT_NOTHING = 1, AT_END, AT_CORNER = AT_END + 2, AT_SIDE = AT_CORNER + 3 * RM_MAX_SIDES };
 
-/* AT_END + h if that end lies in the triangle's plane, AT_CORNER + h if that corner lies on the edge's line, AT_SIDE + h if the
- * edge's line meets the line of that side alone. */
-static int find_limit(const double *const p[2], const double *const v[3])
+/* The corner of triangle t that lies on the line p0 p1, which is not in its plane; -1 if there is none. *side is one that the
+ * line meets elsewhere, -1 likewise. */
+static int corner_on_line(const rm_trimesh *m, rm_lid t, const double *const p[2], int *side)
 {
-  bool on[3]; /* meets the line through corners h and h + 1 */
+  const double *v[3];
+  bool          on[3]; /* the line meets that through corners h and h + 1 */
+
+  *side = -1;
+  for (int h = 0; h < 3; h++) v[h] = m->vertex[m->triangle[t][h]];
+  for (int h = 0; h < 2; h++) on[h] = rm_orient3d(p[0], p[1], v[h], v[h + 1]) == 0;
+  if (on[0] && on[1]) return 1;
+  on[2] = rm_orient3d(p[0], p[1], v[2], v[0]) == 0;
+  if (on[2] && (on[0] || on[1])) return on[0] ? 0 : 2;
+  for (int h = 0; h < 3; h++)
+    if (on[h] && !rm_is_inner(m, t, h)) *side = h;
+  return -1;
+}
+
+/* AT_END + h if that end lies in the facet's plane; by the first triangle that tells, AT_CORNER and more if that corner lies on
+ * the edge's line, else AT_SIDE and more if the edge's line meets the line of that side. */
+static int find_limit(const rm_trimesh *m, rm_lid facet, const double *const p[2])
+{
+  const rm_lid *v = m->triangle[facet];
+  rm_lid        t = facet;
+  int           on_side = AT_NOTHING, k = 0;
 
   for (int h = 0; h < 2; h++)
-    if (rm_orient3d(v[0], v[1], v[2], p[h]) == 0) return AT_END + h;
-  for (int h = 0; h < 2; h++) on[h] = rm_orient3d(p[0], p[1], v[h], v[h + 1]) == 0;
-  if (on[0] && on[1]) return AT_CORNER + 1;
-  on[2] = rm_orient3d(p[0], p[1], v[2], v[0]) == 0;
-  if (on[2]) return on[0] ? AT_CORNER : on[1] ? AT_CORNER + 2 : AT_SIDE + 2;
-  return on[0] ? AT_SIDE : on[1] ? AT_SIDE + 1 : AT_NOTHING;
+    if (rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], p[h]) == 0) return AT_END + h;
+  do {
+    int       side;
+    const int corner = corner_on_line(m, t, p, &side);
+
+    if (corner >= 0) return AT_CORNER + 3 * k + corner;
+    if (side >= 0 && on_side == AT_NOTHING) on_side = AT_SIDE + 3 * k + side;
+    t = rm_facet_next(m, t);
+    k++;
+  } while (t != facet);
+  return on_side;
 }
 
 /* Give a locus its vertex, if it has one, and its edges. A crossing is the end of many sides: its answer is kept. */
@@ -98,15 +124,22 @@ static void settle_locus(const work *w, locus *l)
   if (l->crossing < 0) return;
   const rm_trimesh  *own = w->o->mesh[l->mesh], *other = w->o->mesh[1 - l->mesh];
   const rm_crossing *x = &w->o->trace[l->mesh].crossing[l->crossing];
-  const rm_lid      *e = own->edge[x->edge], *t = other->triangle[x->triangle / 2];
+  const rm_lid      *e = own->edge[x->edge];
+  rm_lid             t = x->triangle / 2;
   uint8_t           *at = &w->limit[l->mesh][l->crossing];
 
-  if (!*at)
-    *at = (uint8_t)find_limit((const double *const[2]){own->vertex[e[0]], own->vertex[e[1]]},
-                              (const double *const[3]){other->vertex[t[0]], other->vertex[t[1]], other->vertex[t[2]]});
+  if (!*at) *at = (uint8_t)find_limit(other, t, (const double *const[2]){own->vertex[e[0]], own->vertex[e[1]]});
   l->edge[l->mesh] = x->edge;
-  if (*at >= AT_SIDE) l->edge[1 - l->mesh] = other->triangle_edge[x->triangle / 2][*at - AT_SIDE];
-  else if (*at != AT_NOTHING) l->vertex = *at < AT_CORNER ? own->vertex[e[*at - AT_END]] : other->vertex[t[*at - AT_CORNER]];
+  if (*at == AT_NOTHING) return;
+  if (*at < AT_CORNER) {
+    l->vertex = own->vertex[e[*at - AT_END]];
+    return;
+  }
+  const int from = *at >= AT_SIDE ? *at - AT_SIDE : *at - AT_CORNER;
+
+  for (int k = 0; k < from / 3; k++) t = rm_facet_next(other, t);
+  if (*at >= AT_SIDE) l->edge[1 - l->mesh] = other->triangle_edge[t][from % 3];
+  else l->vertex = other->vertex[other->triangle[t][from % 3]];
 }
 
 /* A settled locus where two edges cross: both meshes may have it as a crossing, with one triangle or another. */

@@ -7,8 +7,8 @@
  * boxes. So all terms are of the size of the smaller cell, wherever it lies. A point is its edge's first vertex plus lambda
  * times the edge, and is taken relative to O before anything is multiplied.
  *
- * Cost: two cones per segment and cell beside it in mesh 1, one per piece of an edge and triangle at it; 40 operations per
- * cone. */
+ * Cost: two cones per segment and cell beside it in mesh 1, one per piece of an edge and facet at it, and for edges of mesh 1
+ * per cell beside that; 40 operations per cone. */
 #include "moments/moments_private.h"
 
 #include <math.h>
@@ -183,11 +183,11 @@ INLINE plane plane_of(const work *w, int mesh, rm_lid t)
   const double      square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], inverse = square > 0 ? 1 / square : 0;
   const double      height = (n[0] * (v[0] - o[0]) + n[1] * (v[1] - o[1]) + n[2] * (v[2] - o[2])) * inverse;
 
-  return (plane){mesh, t, n, v, inverse, {n[0] * height, n[1] * height, n[2] * height}, height};
+  return (plane){mesh, t, n, v, inverse, {n[0] * height, n[1] * height, n[2] * height}, height, 1};
 }
 
-/* Segments in triangle t of cell i, which lies on its left (g = 1) or right (g = -1). */
-INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_side)
+/* Segments in a facet of cell i. */
+INLINE void segments_in(work *w, rm_lid i, const plane *pt, sink *add_side)
 {
   const rm_overlay *o    = w->o;
   const int         skin = FROM_BOTH | (o->mesh[0]->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
@@ -201,7 +201,7 @@ INLINE void segments_in(work *w, rm_lid i, const plane *pt, double g, sink *add_
     const plane  pb    = plane_of(w, 1, b);
     const int    kind  = skin | (o->mesh[1]->triangle_is_skin[b] ? SKIN_TARGET : 0);
 
-    add_side(w, i, o->mesh[1]->side[b], kind, g, pt, &pb, &p, &q);
+    add_side(w, i, o->mesh[1]->side[b], kind, pt->outward, pt, &pb, &p, &q);
   }
 }
 
@@ -244,7 +244,8 @@ INLINE rm_lid run_end(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell, int n
 }
 
 /* Piece k of edge e, and those behind it that count as one with it, where cells overlap. */
-static void tangled_pieces(work *w, rm_lid i, const plane *pt, rm_lid e, rm_lid k, int kind, double sign, sink *add_side)
+static void tangled_pieces(work *w, rm_lid i, rm_lid e, rm_lid k, int kind, double sign, const plane *pl, const plane *other,
+                           sink *add_side)
 {
   const rm_trace   *tr    = &w->o->trace[0];
   const rm_lid      state = piece_state(tr, e, k);
@@ -258,36 +259,36 @@ static void tangled_pieces(work *w, rm_lid i, const plane *pt, rm_lid e, rm_lid 
 
     if (end == k) continue;
     const point q = piece_point(w, 0, e, end);
-    add_side(w, i, in, kind, sign * list[z].number, pt, NULL, &p, &q);
+    add_side(w, i, in, kind, sign * list[z].number, pl, other, &p, &q);
   }
 }
 
-/* Pieces of the edges of triangle t, which bound its polygons in the cells of mesh 2. */
-INLINE void own_pieces_in(work *w, rm_lid i, const plane *pt, double g, sink *add_side)
+/* Pieces of an edge of cell i, which bound polygons of its facets in the cells of mesh 2. */
+INLINE void pieces_at(work *w, rm_lid i, const wedge *at, sink *add_side)
 {
-  const rm_trimesh *m    = w->o->mesh[0];
-  const rm_trace   *tr   = &w->o->trace[0];
-  const int         kind = FROM_SOURCE | (m->triangle_is_skin[pt->triangle] ? SKIN_SOURCE : 0);
+  const rm_trace *tr     = &w->o->trace[0];
+  const uint8_t  *skin   = w->o->mesh[0]->triangle_is_skin;
+  const plane    *along  = at->plane[0] >= 0 ? &w->own_plane[at->plane[0]] : NULL;
+  const plane    *second = at->plane[1] >= 0 ? &w->own_plane[at->plane[1]] : NULL;
+  const plane    *pl     = along ? along : second, *other = along ? second : NULL;
+  const int       kind   = FROM_SOURCE | (skin[pl->triangle] || (other && skin[other->triangle]) ? SKIN_SOURCE : 0);
+  const rm_lid    e = at->edge, count = tr->count[e];
+  const double    sign   = along ? 1 : -1;
+  rm_lid          before = RM_OUTSIDE, in[2] = {tr->state[e], RM_OUTSIDE};
+  point           p = piece_point(w, 0, e, 0);
 
   if (w->skin_only && !(kind & SKIN_SOURCE)) return;
-  for (int h = 0; h < 3; h++) {
-    const rm_lid e = m->triangle_edge[pt->triangle][h], count = tr->count[e];
-    const double s = h == 2 ? -g : g;
-    rm_lid       before = RM_OUTSIDE, in[2] = {tr->state[e], RM_OUTSIDE};
-    point        p = vertex_point(w, m, m->edge[e][0]);
+  for (rm_lid k = 0; k <= count; k++) {
+    const rm_lid next = k < count ? tr->crossing[tr->first[e] + k].state : RM_OUTSIDE;
+    const point  q    = piece_point(w, 0, e, k + 1);
 
-    for (rm_lid k = 0; k <= count; k++) {
-      const rm_lid next = k < count ? tr->crossing[tr->first[e] + k].state : RM_OUTSIDE;
-      const point  q    = piece_point(w, 0, e, k + 1);
-
-      if (before < RM_OUTSIDE || in[0] < RM_OUTSIDE || next < RM_OUTSIDE || (in[0] >= 0 && (in[0] == before || in[0] == next)))
-        tangled_pieces(w, i, pt, e, k, kind, s, add_side);
-      else
-        add_side(w, i, in, kind, s, pt, NULL, &p, &q);
-      p      = q;
-      before = in[0];
-      in[0]  = next;
-    }
+    if (before < RM_OUTSIDE || in[0] < RM_OUTSIDE || next < RM_OUTSIDE || (in[0] >= 0 && (in[0] == before || in[0] == next)))
+      tangled_pieces(w, i, e, k, kind, sign, pl, other, add_side);
+    else
+      add_side(w, i, in, kind, sign, pl, other, &p, &q);
+    p      = q;
+    before = in[0];
+    in[0]  = next;
   }
 }
 
@@ -304,30 +305,68 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
 
     if (end == at) continue;
     const point p = piece_point(w, 1, f, at), q = piece_point(w, 1, f, end);
-    for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
-      const rm_lid b  = m->star[z] / 4;
+    for (rm_lid z = m->ring_offset[f]; z < m->ring_offset[f + 1]; z++) {
+      const rm_lid b  = m->ring[z] / 4;
       if (w->skin_only && !m->triangle_is_skin[b]) continue;
       const plane  pb = plane_of(w, 1, b);
 
       add_side(w, i, m->side[b], FROM_TARGET | (m->triangle_is_skin[b] ? SKIN_TARGET : 0),
-               (m->star[z] & 3) == 2 ? -number : number, &pb, NULL, &p, &q);
+               m->ring[z] & 2 ? -number : number, &pb, NULL, &p, &q);
     }
   }
 }
 
-INLINE void all_sides(work *w, rm_lid i, sink *add_side)
+/* Edge e of cell i bounds its facet in the plane of that number, whose boundary runs along it, seen from outside of the cell, or
+ * against it. An edge has one facet each way nearly always: these two are one wedge. */
+static remap_status add_to_wedge(work *w, rm_lid e, int number, bool against)
 {
-  const rm_trimesh *m1 = w->o->mesh[0];
-  const double     *box = m1->cell_box[i];
+  const int k = w->wedge_of[e];
+
+  if (k < 0 || w->wedge[k].plane[against] >= 0) {
+    RM_TRY(rm_grow(&w->wedge, &w->wedge_room, w->num_wedges + 1, sizeof *w->wedge));
+    w->wedge[w->num_wedges]                = (wedge){e, {-1, -1}};
+    w->wedge[w->num_wedges].plane[against] = number;
+    w->wedge_of[e]                         = w->num_wedges++;
+  } else {
+    w->wedge[k].plane[against] = number;
+  }
+  return REMAP_OK;
+}
+
+/* The planes of cell i's facets, and its edges with the two facets at each: once for all that is summed of the cell. */
+static remap_status open_cell(work *w, rm_lid i)
+{
+  const rm_trimesh *m   = w->o->mesh[0];
+  const double     *box = m->cell_box[i];
 
   w->extent = rm_max(box[3] - box[0], rm_max(box[4] - box[1], box[5] - box[2]));
   for (int c = 0; c < 3; c++) w->centre[c] = box[c] + 0.5 * (box[c + 3] - box[c]);
-  for (rm_lid a = m1->cell_triangle_offset[i]; a < m1->cell_triangle_offset[i + 1]; a++) {
-    const plane  pt = plane_of(w, 0, m1->cell_triangle[a] / 2);
-    const double g  = m1->cell_triangle[a] & 1 ? -1 : 1;
-    segments_in(w, i, &pt, g, add_side);
-    own_pieces_in(w, i, &pt, g, add_side);
+  w->num_planes = w->num_wedges = 0;
+  for (rm_lid a = m->cell_triangle_offset[i]; a < m->cell_triangle_offset[i + 1]; a++) {
+    const rm_lid facet = m->cell_triangle[a] / 2, is_right = m->cell_triangle[a] & 1;
+    rm_lid       t     = facet;
+
+    if (rm_facet_of(m, facet) / 2 != facet) continue;
+    RM_TRY(rm_grow(&w->own_plane, &w->own_plane_room, w->num_planes + 1, sizeof *w->own_plane));
+    w->own_plane[w->num_planes]         = plane_of(w, 0, facet);
+    w->own_plane[w->num_planes].outward = is_right ? -1 : 1;
+    do {
+      for (int h = 0; h < 3; h++)
+        if (!rm_is_inner(m, t, h))
+          RM_TRY(add_to_wedge(w, m->triangle_edge[t][h], w->num_planes, (h == 2) ^ (rm_facet_of(m, t) & 1) ^ is_right));
+      t = rm_facet_next(m, t);
+    } while (t != facet);
+    w->num_planes++;
   }
+  for (int k = 0; k < w->num_wedges; k++) w->wedge_of[w->wedge[k].edge] = -1;
+  return REMAP_OK;
+}
+
+/* Hand on every side of every polygon in the open cell i. */
+INLINE void all_sides(work *w, rm_lid i, sink *add_side)
+{
+  for (int k = 0; k < w->num_planes; k++) segments_in(w, i, &w->own_plane[k], add_side);
+  for (int k = 0; k < w->num_wedges; k++) pieces_at(w, i, &w->wedge[k], add_side);
   foreign_pieces(w, i, add_side);
 }
 
@@ -571,11 +610,14 @@ static remap_status all_cells(work *w)
   for (int k = 0; k < NUM_MEMOS; k++) w->memo[k].edge = -1;
   RM_NEW(w->slot_of, w->scratch, w->o->mesh[1]->num_cells);
   for (rm_lid j = 0; j < w->o->mesh[1]->num_cells; j++) w->slot_of[j] = -1;
+  RM_NEW(w->wedge_of, w->scratch, m1->num_edges);
+  for (rm_lid e = 0; e < m1->num_edges; e++) w->wedge_of[e] = -1;
   for (rm_lid t = 0; t < m1->num_triangles; t++) /* cells by their first triangle: as they lie in space */
     for (int h = 0; h < 2; h++) {
       const rm_lid i = m1->side[t][h];
 
       if (i < 0 || m1->cell_triangle[m1->cell_triangle_offset[i]] != 2 * t + h) continue;
+      RM_TRY(open_cell(w, i));
       if (w->num_sums == 4) all_sides(w, i, add);
       else all_sides(w, i, add_2);
       RM_TRY(w->status);
@@ -633,6 +675,8 @@ remap_status rm_moments_build(rm_arena *arena, const rm_part *part, const rm_ove
   if (status == REMAP_OK) status = keep(arena, &w, out);
   rm_moments_decided(&w);
   free(w.slots);
+  free(w.own_plane);
+  free(w.wedge);
   free(w.exact);
   free(w.source);
   free(w.target);

@@ -56,10 +56,18 @@ typedef struct plane {
   double        inverse; /* 1 / n.n, 0 for a triangle without area */
   double        foot[3]; /* of the perpendicular from the origin of cell i, relative to it */
   double        height;  /* foot = height n */
+  double        outward; /* 1, or -1 if n points into the cell whose facet it is */
 } plane;
 
+/* An edge of a cell and two of its facets there: seen from outside, the boundary of the first runs along it, that of the
+ * second against it. */
+typedef struct wedge {
+  rm_lid edge;
+  int    plane[2]; /* in work.own_plane, -1 */
+} wedge;
+
 /* Where simulation of simplicity leaves a point: in a vertex of one of the meshes, where an edge of one crosses an edge of the
- * other, or where an edge crosses a triangle. The edges are known once the locus is settled; a vertex may lie on more. */
+ * other, or where an edge crosses a facet. The edges are known once the locus is settled; a vertex may lie on more. */
 typedef struct locus {
   const double *vertex;   /* its coordinates if it is one, else NULL                */
   int           mesh;     /* of the edge                                            */
@@ -123,6 +131,11 @@ typedef struct work {
   int               num_sums; /* 4 or 10 */
   int64_t          *piece_offset; /* [cells of mesh 1 + 1] pieces of edges of mesh 2 in them */
   rm_lid          (*piece)[2];    /* edge, number of the piece on it */
+  plane            *own_plane;    /* [num_planes] of the facets of cell i  */
+  wedge            *wedge;        /* [num_wedges] at the edges of cell i   */
+  int              *wedge_of;     /* [edges of mesh 1] -1 between cells    */
+  int64_t           own_plane_room, wedge_room;
+  int               num_planes, num_wedges;
   rm_lid           *slot_of;      /* [cells of mesh 2] -1 */
   slot             *slots;
   int64_t           slots_room;

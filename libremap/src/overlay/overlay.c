@@ -1,8 +1,8 @@
 /* overlay -- traces both meshes through each other and pairs the ends of segments (DESIGN 2.3).
  *
- * A segment is where triangle t of mesh 1 meets triangle b of mesh 2. Its ends are crossings of an edge of one with the other;
- * each crossing ends one segment for every triangle at its edge. Ends are filed under t by counting and sorted by b: O(ends), 8
- * bytes each, for the ends of one triangle are few. */
+ * A segment is where facet t of mesh 1 meets facet b of mesh 2. Its ends are crossings of an edge of one with the other; each
+ * crossing ends one segment for every facet at its edge. Ends are filed under t by counting and sorted by b: O(ends), 8 bytes
+ * each, for the ends of one facet are few. */
 #include "overlay/overlay.h"
 
 #include <string.h>
@@ -10,8 +10,8 @@
 
 enum { MAX_CROSSINGS = 1 << 30 };
 
-/* +1 if triangle boundary h of a star entry runs along the edge. */
-static inline int along(rm_lid star) { return (star & 3) == 2 ? -1 : 1; }
+/* +1 if the boundary of the facet of a ring entry runs along the edge. */
+static inline int along(rm_lid ring) { return ring & 2 ? -1 : 1; }
 
 /* An end as a word: words ascend as ends are to stand. */
 #define LAST (UINT64_C(1) << 31)
@@ -20,7 +20,7 @@ static inline uint64_t end_word(rm_lid other, int64_t crossing, int side, bool i
   return (uint64_t)(uint32_t)other << 32 | (is_last ? LAST : 0) | (uint64_t)(2 * crossing + side);
 }
 
-/* Of all segments in a triangle of mesh 1, the ends as words. */
+/* Of all segments in a facet of mesh 1, the ends as words. */
 static remap_status file_ends(rm_arena *arena, rm_overlay *o, uint64_t **out)
 {
   const rm_trimesh *m1 = o->mesh[0], *m2 = o->mesh[1];
@@ -30,9 +30,9 @@ static remap_status file_ends(rm_arena *arena, rm_overlay *o, uint64_t **out)
 
   RM_NEW0(offset, arena, (int64_t)m1->num_triangles + 2);
   for (rm_lid e = 0; e < m1->num_edges; e++)
-    for (rm_lid k = m1->star_offset[e]; k < m1->star_offset[e + 1]; k++) offset[m1->star[k] / 4 + 2] += t1->count[e];
+    for (rm_lid k = m1->ring_offset[e]; k < m1->ring_offset[e + 1]; k++) offset[m1->ring[k] / 4 + 2] += t1->count[e];
   for (rm_lid f = 0; f < m2->num_edges; f++) {
-    const rm_lid at_edge = m2->star_offset[f + 1] - m2->star_offset[f];
+    const rm_lid at_edge = m2->ring_offset[f + 1] - m2->ring_offset[f];
     for (int64_t x = t2->first[f]; x < t2->first[f] + t2->count[f]; x++) offset[t2->crossing[x].triangle / 2 + 2] += at_edge;
   }
   for (rm_lid t = 0; t < m1->num_triangles; t++) offset[t + 2] += offset[t + 1];
@@ -41,22 +41,22 @@ static remap_status file_ends(rm_arena *arena, rm_overlay *o, uint64_t **out)
     for (int64_t x = t1->first[e]; x < t1->first[e] + t1->count[e]; x++) {
       const rm_lid b = t1->crossing[x].triangle / 2;
       const int    s = t1->crossing[x].triangle & 1 ? -1 : 1;
-      for (rm_lid k = m1->star_offset[e]; k < m1->star_offset[e + 1]; k++)
-        end[offset[m1->star[k] / 4 + 1]++] = end_word(b, x, 0, along(m1->star[k]) * s < 0);
+      for (rm_lid k = m1->ring_offset[e]; k < m1->ring_offset[e + 1]; k++)
+        end[offset[m1->ring[k] / 4 + 1]++] = end_word(b, x, 0, along(m1->ring[k]) * s < 0);
     }
   for (rm_lid f = 0; f < m2->num_edges; f++)
     for (int64_t x = t2->first[f]; x < t2->first[f] + t2->count[f]; x++) {
       const rm_lid t = t2->crossing[x].triangle / 2;
       const int    s = t2->crossing[x].triangle & 1 ? -1 : 1;
-      for (rm_lid k = m2->star_offset[f]; k < m2->star_offset[f + 1]; k++)
-        end[offset[t + 1]++] = end_word(m2->star[k] / 4, x, 1, along(m2->star[k]) * s > 0);
+      for (rm_lid k = m2->ring_offset[f]; k < m2->ring_offset[f + 1]; k++)
+        end[offset[t + 1]++] = end_word(m2->ring[k] / 4, x, 1, along(m2->ring[k]) * s > 0);
     }
   o->end_offset = offset;
   *out          = end;
   return REMAP_OK;
 }
 
-/* Sort the ends of every triangle, by the other triangle and starts first, and make of their words what they are: in place.
+/* Sort the ends of every facet, by the other facet and starts first, and make of their words what they are: in place.
  * False if one segment has not exactly one start and one end, *bad is then its triangle. */
 static bool pair_ends(const rm_overlay *o, uint64_t *word, rm_lid *bad)
 {

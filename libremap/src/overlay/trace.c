@@ -5,10 +5,12 @@
  * between them, the first one from a point outside. So crossings are found in the order of their edges.
  *
  * In a cell, the edge's line is looked along: the cell's vertices are taken in a frame sheared so that the edge runs along an
- * axis, and a triangle is crossed if the line, now a point, lies in it. Most triangles lie to one side as a whole, which bits
- * per vertex tell; for the others it takes three determinants of 2x2, with one error bound for the cell. What the bound cannot
- * decide goes to the exact predicate. Cost: O(triangles of the cell) per crossing by adjacency, O(log n + hits) per edge by the
- * box tree. */
+ * axis, and a panel (a triangle, or a planar face of four sides) is crossed if the line, now a point, lies in it. Most panels
+ * lie to one side as a whole, which bits per vertex tell; for the others it takes a determinant of 2x2 per side, with one error
+ * bound for the cell. What the bound cannot decide goes to the exact predicate. Cost: O(panels of the cell) per crossing by
+ * adjacency, O(log n + hits) per edge by the box tree.
+ *
+ * Whatever triangle is met, a crossing is spoken of as one with its facet, that is with the triangle this is called by. */
 #include "overlay/trace.h"
 
 #include <math.h>
@@ -16,7 +18,8 @@
 #include <string.h>
 #include "overlay/states.h"
 
-/* A crossing found: triangle of the other mesh and the sign of the crossing seen along the edge from its first vertex. */
+/* A crossing found: what a facet of the other mesh is called by and the sign of the crossing seen along the edge from its first
+ * vertex. */
 typedef struct hit {
   rm_lid triangle;
   int    sign;
@@ -188,6 +191,13 @@ static void sort_hits(const tracer *t, hit *h, int n)
   }
 }
 
+/* The crossing of triangle b with sign s as one of its facet. */
+static inline hit hit_of(const rm_trimesh *m, rm_lid b, int s)
+{
+  const rm_lid facet = rm_facet_of(m, b);
+  return (hit){facet / 2, facet & 1 ? -s : s};
+}
+
 static remap_status push_hit(tracer *t, rm_lid triangle, int sign)
 {
   RM_TRY(rm_grow(&t->hits, &t->hits_room, t->num_hits + 1, sizeof *t->hits));
@@ -215,7 +225,7 @@ static int collect_hit(void *user, rm_lid item)
   if (!s) return 0;
   c->status = rm_grow(c->list, c->room, *c->num + 1, sizeof **c->list);
   if (c->status != REMAP_OK) return 1;
-  (*c->list)[(*c->num)++] = (hit){b, s};
+  (*c->list)[(*c->num)++] = hit_of(c->t->other, b, s);
   return 0;
 }
 
@@ -332,54 +342,63 @@ static void look_along(const tracer *t, rm_lid c, view *w)
   w->reach = reach;
 }
 
-/* The sides of triangle v against the line, as determinants of 2x2: all positive or all negative if it is crossed. */
-static inline void sides(const view *w, const uint8_t v[3], double d[3])
+/* The sides of a polygon of n corners v against the line, as determinants of 2x2: all positive or all negative if it is
+ * crossed. */
+static inline void sides(const view *w, const uint8_t *v, int n, double *d)
 {
-  for (int h = 0; h < 3; h++) d[h] = w->x[v[h]] * w->y[v[(h + 1) % 3]] - w->x[v[(h + 1) % 3]] * w->y[v[h]];
+  for (int h = 0; h < n; h++) {
+    const uint8_t a = v[h], b = v[h + 1 < n ? h + 1 : 0];
+    d[h] = w->x[a] * w->y[b] - w->x[b] * w->y[a];
+  }
 }
 
-/* crosses, where sign[h] holds those sides that are certain, else 0. The third side runs against its edge. */
-static __attribute__((noinline)) int crosses_closely(const tracer *t, rm_lid b, const int sign[3])
+/* crosses, where sign[h] holds those sides that are certain, else 0. */
+static __attribute__((noinline)) int crosses_closely(const tracer *t, rm_lid c, const uint8_t *v, int n, const int *sign)
 {
-  const rm_lid *e = t->other->triangle_edge[b];
-  int           all = sign[0] ? sign[0] : sign[1] ? sign[1] : sign[2];
+  const rm_trimesh *m      = t->other;
+  const rm_lid     *vertex = m->cell_vertex + m->cell_vertex_offset[c];
+  int               all    = 0;
 
-  for (int h = 0; h < 3; h++) {
-    if (sign[h]) continue;
-    const int s = h == 2 ? -edge_side(t, e[h]) : edge_side(t, e[h]);
+  for (int h = 0; h < n && !all; h++) all = sign[h];
+  for (int h = 0; h < n; h++) {
+    const uint8_t a = v[h], b = v[h + 1 < n ? h + 1 : 0];
+    if (sign[h] || a == b) continue;
+    const int s = rm_edge_side(t->p0, t->p1, m->vertex[vertex[a]], m->vertex[vertex[b]], t->moved, NULL);
     if (!s || (all && s != all)) return 0;
     all = s;
   }
   return all;
 }
 
-/* Sign with which the line crosses triangle b, whose vertices are v in the view. Exact. */
-static inline int crosses(const tracer *t, const view *w, const uint8_t v[3], rm_lid b)
+/* Sign with which the line crosses a panel of cell c, whose n corners are v in the view: of n = 4, the last two may be one.
+ * Exact. */
+static inline int crosses(const tracer *t, const view *w, rm_lid c, const uint8_t *v, int n)
 {
   const double bound = LINE_NOISE * w->reach * w->reach;
-  double       d[3];
-  int          sign[3], along = 0, against = 0;
+  double       d[4];
+  int          sign[4], along = 0, against = 0;
 
-  sides(w, v, d);
-  for (int h = 0; h < 3; h++) {
+  sides(w, v, n, d);
+  for (int h = 0; h < n; h++) {
     along += d[h] > bound;
     against += d[h] < -bound;
     sign[h] = t->turn * ((d[h] > bound) - (d[h] < -bound));
   }
   if (along && against) return 0;
-  if (along == 3 || against == 3) return sign[0];
-  return crosses_closely(t, b, sign);
+  if (along == n || against == n) return sign[0];
+  return crosses_closely(t, c, v, n, sign);
 }
 
-/* The edge ends before it meets triangle next, which its line crosses. Exact. */
-static inline bool ends_before(const tracer *t, const view *w, const uint8_t v[3], hit next)
+/* The edge ends before it meets facet next, which its line crosses; with sign s about the normal of corners v, which lie in it.
+ * Exact. */
+static inline bool ends_before(const tracer *t, const view *w, const uint8_t v[3], int s, hit next)
 {
   const double end = t->u[t->axis[2]], largest = w->reach + fabs(end);
   double       d[3], sum;
 
-  sides(w, v, d);
+  sides(w, v, 3, d);
   sum = d[1] * (w->z[v[0]] - end) + d[2] * (w->z[v[1]] - end) + d[0] * (w->z[v[2]] - end); /* of the sign of d, turned */
-  if (fabs(sum) > HEIGHT_NOISE * w->reach * w->reach * largest) return (sum > 0) == (next.sign > 0);
+  if (fabs(sum) > HEIGHT_NOISE * w->reach * w->reach * largest) return (sum > 0) == (s > 0);
   return end_side(t, next.triangle, t->p1) != next.sign;
 }
 
@@ -404,31 +423,36 @@ static ahead nearest_hit(const tracer *t, const hit *list, int n, hit last, int 
   return best < 0 ? AHEAD_TANGLED : AHEAD_CROSSING;
 }
 
-/* Where the walk leaves cell c, which it entered through `last` or starts in. */
-static ahead leave_cell(const tracer *t, rm_lid c, hit last, hit *next)
+/* leave_cell, in a mesh whose panels have n corners. */
+static inline __attribute__((always_inline)) ahead leave_by(const tracer *t, rm_lid c, hit last, hit *next,
+                                                            const uint8_t *corner, int n_corners)
 {
-  const rm_trimesh *m = t->other;
-  const rm_lid  first = m->cell_triangle_offset[c], nt = m->cell_triangle_offset[c + 1] - first;
-  const rm_lid *triangle = m->cell_triangle + first;
-  const uint8_t (*vertex)[3] = m->cell_triangle_vertex + first;
-  view    w;
-  uint8_t near[MAX_LOCAL], place[MAX_LOCAL];
-  hit     list[MAX_LOCAL];
-  int     num_near = 0, n = 0, exits = 0, exit = 0;
+  const rm_trimesh *m     = t->other;
+  const rm_lid      first = m->panel_offset[c], num = m->panel_offset[c + 1] - first;
+  const rm_lid     *panel = m->panel + first;
+  view              w;
+  uint8_t           near[MAX_LOCAL], place[MAX_LOCAL];
+  hit               list[MAX_LOCAL];
+  int               num_near = 0, n = 0, exits = 0, exit = 0;
 
   look_along(t, c, &w);
-  for (rm_lid a = 0; a < nt; a++) {
+  for (rm_lid a = 0; a < num; a++) {
+    const uint8_t *v = corner + n_corners * (first + a);
+    uint8_t        beside = w.beside[v[0]] & w.beside[v[1]] & w.beside[v[2]];
+
+    if (n_corners == 4) beside &= w.beside[v[3]];
     near[num_near] = (uint8_t)a;
-    num_near += !(w.beside[vertex[a][0]] & w.beside[vertex[a][1]] & w.beside[vertex[a][2]]);
+    num_near += !beside;
   }
   for (int k = 0; k < num_near; k++) {
-    const rm_lid a = near[k], b = triangle[a] / 2;
-    const int    s = b == last.triangle ? last.sign : crosses(t, &w, vertex[a], b);
+    const rm_lid   a = near[k], b = panel[a] / 2, facet = n_corners == 3 ? b : rm_facet_of(m, b) / 2;
+    const uint8_t *v = corner + n_corners * (first + a);
+    const int      s = facet != last.triangle ? crosses(t, &w, c, v, n_corners) : b == facet ? last.sign : 0;
 
     if (!s) continue;
-    list[n]  = (hit){b, s};
+    list[n]  = n_corners == 3 ? (hit){b, s} : hit_of(m, b, s);
     place[n] = near[k];
-    if ((triangle[a] & 1 ? -s : s) > 0) exits++, exit = n;
+    if ((panel[a] & 1 ? -s : s) > 0) exits++, exit = n;
     n++;
   }
   if (exits == 1 && n == 2) { /* in once, out once */
@@ -438,7 +462,17 @@ static ahead leave_cell(const tracer *t, rm_lid c, hit last, hit *next)
     if (m->side[list[exit].triangle][list[exit].sign > 0 ? 0 : 1] != c) return AHEAD_TANGLED;
   }
   *next = list[exit];
-  return ends_before(t, &w, vertex[place[exit]], *next) ? AHEAD_END : AHEAD_CROSSING;
+  const int s = n_corners == 4 && rm_facet_of(m, panel[place[exit]] / 2) & 1 ? -next->sign : next->sign;
+  return ends_before(t, &w, corner + n_corners * (first + place[exit]), s, *next) ? AHEAD_END : AHEAD_CROSSING;
+}
+
+/* Where the walk leaves cell c, which it entered through `last` or starts in. */
+static ahead leave_cell(const tracer *t, rm_lid c, hit last, hit *next)
+{
+  const rm_trimesh *m = t->other;
+
+  if (m->panel_corner) return leave_by(t, c, last, next, m->panel_corner[0], 4);
+  return leave_by(t, c, last, next, m->cell_triangle_vertex[0], 3);
 }
 
 /* Where the walk meets the skin again from outside. */
@@ -654,7 +688,7 @@ static remap_status colour(tracer *t, const rm_progress *progress, rm_lid *bad_e
         progress->call(progress->user, t->moved > 0 ? "tracing of source edges" : "tracing of target edges",
                        (double)e / m->num_edges))
       return REMAP_CANCELLED;
-    if (far[v] & far[w]) {
+    if (far[v] & far[w] || rm_is_inside_facets(m, e)) {
       t->first[e] = t->num_crossings;
       t->count[e] = 0;
       t->state[e] = RM_OUTSIDE;

@@ -2,7 +2,7 @@
  *
  * Points are sorted by Morton key, triangles and edges are bucketed by their lowest vertex: O(n) time. About 800 bytes per
  * hexahedron with `diagonal`, 1600 with `centre`. */
-#include "overlay/overlay.h"
+#include "overlay/facets.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,15 +14,6 @@ enum {
   MAX_TRIANGLES       = 1 << 29
 };
 
-/* One triangle as a face of one cell, before joining. */
-typedef struct corner_triple {
-  rm_lid  v[3];  /* ascending vertices */
-  rm_lid  cell;  /* the cell beside it */
-  rm_lid  face;  /* of the piece */
-  uint8_t right; /* 1: the cell is on the side the normal points to */
-  uint8_t skin;
-} corner_triple;
-
 typedef struct builder {
   rm_arena       *scratch;
   const rm_frame *frame;
@@ -32,6 +23,7 @@ typedef struct builder {
   int64_t         num_raw;
   int64_t       (*raw)[3];   /* [num_raw] points, oriented as the face        */
   rm_lid         *raw_face;  /* [num_raw]                                     */
+  rm_facets       facets;
 } builder;
 
 /* ---- triangulation of the faces -------------------------------------------------------------------------------- */
@@ -55,6 +47,7 @@ static remap_status triangulate_faces(builder *b, remap_faces faces)
   RM_NEW(b->point, b->scratch, (int64_t)p->num_nodes + p->num_faces);
   RM_NEW(b->raw, b->scratch, most);
   RM_NEW(b->raw_face, b->scratch, most);
+  RM_NEW(b->facets.is_whole, b->scratch, p->num_faces);
   if (p->num_nodes) memcpy(b->point, p->node_xyz, sizeof *b->point * (size_t)p->num_nodes);
   b->num_points = p->num_nodes;
   for (rm_lid f = 0; f < p->num_faces; f++) {
@@ -75,6 +68,8 @@ static remap_status triangulate_faces(builder *b, remap_faces faces)
       b->raw_face[b->num_raw++] = f;
     }
     if (used) memcpy(b->point[b->num_points++], centre, sizeof centre);
+    b->facets.is_whole[f] = n > 3 && n <= RM_MAX_SIDES && !used && !p->face_is_skin[f] &&
+                            rm_is_planar_convex((const double (*)[3])xyz, n);
   }
   return REMAP_OK;
 }
@@ -152,20 +147,20 @@ static remap_status number_vertices(rm_arena *arena, builder *b, rm_lid *vertex_
 /* ---- triangles --------------------------------------------------------------------------------------------------- */
 
 /* Of triangles with one lowest vertex, the rest of their order. */
-static uint64_t order_of(const corner_triple *t)
+static uint64_t order_of(const rm_triple *t)
 {
   return (uint64_t)t->v[1] << 32 | (uint64_t)t->v[2] << 1 | t->right;
 }
 
 /* Sort n triples by their order, stable: few by insertion, many by way of their keys. */
-static remap_status sort_triples(rm_arena *scratch, corner_triple *triple, int64_t n)
+static remap_status sort_triples(rm_arena *scratch, rm_triple *triple, int64_t n)
 {
-  rm_keyed      *key, *spare;
-  corner_triple *copy;
+  rm_keyed  *key, *spare;
+  rm_triple *copy;
 
   for (int64_t i = 1; i < n && n <= RM_FEW_WORDS; i++) {
-    const corner_triple x = triple[i];
-    int64_t             k = i;
+    const rm_triple x = triple[i];
+    int64_t         k = i;
     for (; k > 0 && order_of(&triple[k - 1]) > order_of(&x); k--) triple[k] = triple[k - 1];
     triple[k] = x;
   }
@@ -181,12 +176,12 @@ static remap_status sort_triples(rm_arena *scratch, corner_triple *triple, int64
 }
 
 /* Every triangle once per cell beside it, bucketed by its lowest vertex and sorted within the bucket. */
-static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, rm_lid num_vertices, corner_triple **out,
+static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, rm_lid num_vertices, rm_triple **out,
                                     int64_t *num)
 {
   const rm_piece *p = b->piece;
   int64_t        *offset, n = 0;
-  corner_triple  *triple;
+  rm_triple      *triple;
 
   RM_NEW0(offset, b->scratch, (int64_t)num_vertices + 2);
   for (int64_t k = 0; k < b->num_raw; k++) {
@@ -201,8 +196,8 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   RM_NEW(triple, b->scratch, n);
   for (int64_t k = 0; k < b->num_raw; k++) {
     const rm_lid  face = b->raw_face[k];
-    corner_triple t    = {
-           {vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, face, 0, p->face_is_skin[face]};
+    rm_triple     t    = {
+           {vertex_of[b->raw[k][0]], vertex_of[b->raw[k][1]], vertex_of[b->raw[k][2]]}, 0, face, 0, 0, p->face_is_skin[face]};
     int           odd  = 0;
 
     if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
@@ -210,6 +205,7 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
     if (t.v[0] > t.v[1]) { const rm_lid s = t.v[0]; t.v[0] = t.v[1], t.v[1] = s, odd ^= 1; }
     for (int h = 0; h < 2; h++) {
       t.cell  = p->face_cell[face][h];
+      t.side  = (uint8_t)h;
       t.right = (uint8_t)(odd ^ h); /* the face's normal points out of its owner, which is therefore on the left */
       if (t.cell >= 0) triple[offset[t.v[0] + 1]++] = t;
     }
@@ -220,19 +216,17 @@ static remap_status collect_triples(const builder *b, const rm_lid *vertex_of, r
   return REMAP_OK;
 }
 
-/* The end of the copies of triangle i; *joined if they are two on opposite sides, of two cells. Those of one cell stay apart:
- * they would where a third copy is there too, which another rank need not have, and sums must not depend on that. */
-static inline int64_t copies_end(const corner_triple *triple, int64_t i, int64_t num, bool *joined)
+/* The end of the copies of triangle i; *joined if they are two that become one. */
+static inline int64_t copies_end(const builder *b, const rm_triple *triple, int64_t i, int64_t num, bool *joined)
 {
-  int64_t k = i + 1;
+  const int64_t end = rm_triple_copies(triple, i, num, joined);
 
-  while (k < num && !memcmp(triple[k].v, triple[i].v, sizeof triple[i].v)) k++;
-  *joined = k == i + 2 && triple[i].right != triple[i + 1].right && triple[i].cell != triple[i + 1].cell;
-  return k;
+  if (*joined && b->facets.any) *joined = rm_facets_admit(&b->facets, &triple[i], &triple[i + 1]);
+  return end;
 }
 
 /* Join two cells' copies of a triangle that lie on opposite sides; any other copies stay apart, each a skin. */
-static remap_status join_triangles(rm_arena *arena, const corner_triple *triple, int64_t num, rm_trimesh *m)
+static remap_status join_triangles(rm_arena *arena, builder *b, const rm_triple *triple, int64_t num, rm_trimesh *m)
 {
   rm_lid (*triangle)[3], (*side)[2], (*face)[2];
   uint8_t *skin;
@@ -240,13 +234,15 @@ static remap_status join_triangles(rm_arena *arena, const corner_triple *triple,
   rm_lid   count = 0;
   bool     joined;
 
-  for (int64_t i = 0; i < num; after -= joined) i = copies_end(triple, i, num, &joined);
+  RM_TRY(rm_facets_compare(b->scratch, &b->facets, b->piece->num_faces, triple, num));
+  for (int64_t i = 0; i < num; after -= joined) i = copies_end(b, triple, i, num, &joined);
   RM_NEW(triangle, arena, after);
   RM_NEW(side, arena, after);
   RM_NEW(skin, arena, after);
   RM_NEW(face, arena, after);
+  RM_TRY(rm_facets_open(arena, &b->facets, after));
   for (int64_t i = 0; i < num;) {
-    const int64_t end = copies_end(triple, i, num, &joined);
+    const int64_t end = copies_end(b, triple, i, num, &joined);
 
     for (; i < end; i += 1 + joined) {
       memcpy(triangle[count], triple[i].v, sizeof *triangle);
@@ -255,6 +251,7 @@ static remap_status join_triangles(rm_arena *arena, const corner_triple *triple,
         side[count][triple[i + h].right] = triple[i + h].cell;
         face[count][triple[i + h].right] = triple[i + h].face;
       }
+      if (b->facets.any) rm_facets_add(&b->facets, triple + i, joined, count);
       skin[count++] = !joined && triple[i].skin;
     }
   }
@@ -648,7 +645,7 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
 static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_trimesh *m)
 {
   rm_lid        *vertex_of;
-  corner_triple *triple;
+  rm_triple *triple;
   int64_t        num_triples;
   double       (*normal)[3];
 
@@ -656,7 +653,7 @@ static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_tri
   RM_NEW(vertex_of, b->scratch, b->num_points);
   RM_TRY(number_vertices(arena, b, vertex_of, m));
   RM_TRY(collect_triples(b, vertex_of, m->num_vertices, &triple, &num_triples));
-  RM_TRY(join_triangles(arena, triple, num_triples, m));
+  RM_TRY(join_triangles(arena, b, triple, num_triples, m));
   RM_NEW(normal, arena, m->num_triangles);
   for (rm_lid t = 0; t < m->num_triangles; t++) triangle_normal(m, t, normal[t]);
   m->normal = (const double (*)[3])normal;
@@ -666,6 +663,7 @@ static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_tri
   RM_TRY(vertices_of_cells(arena, b->scratch, m));
   RM_TRY(boxes(arena, m));
   RM_TRY(collect_skin(arena, m));
+  RM_TRY(rm_facets_finish(arena, b->scratch, &b->facets, m));
   return choose_walks(arena, b->scratch, m);
 }
 

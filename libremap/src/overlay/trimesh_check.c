@@ -98,7 +98,8 @@ static bool triangles_are_right(const rm_trimesh *m)
     const bool alone = (t < 2 || compare_lids(m->triangle[t - 2], v, 3)) &&
                        (t + 1 == m->num_triangles || compare_lids(m->triangle[t + 1], v, 3));
     const bool opposite = (side[0] == RM_OUTSIDE) != (m->side[t - 1][0] == RM_OUTSIDE);
-    if (alone && opposite && only_cell(side) != only_cell(m->side[t - 1])) return false;
+    const bool of_whole = rm_facet_next(m, t) != t || rm_facet_next(m, t - 1) != t - 1; /* joined together or not at all */
+    if (alone && opposite && !of_whole && only_cell(side) != only_cell(m->side[t - 1])) return false;
   }
   return true;
 }
@@ -134,6 +135,97 @@ static bool vertex_edges_are_right(const rm_trimesh *m)
       if (k > m->vertex_edge_offset[v] && m->vertex_edge[k - 1] >= e) return false;
     }
   return true;
+}
+
+/* ---- facets ------------------------------------------------------------------------------------------------------ */
+
+/* Triangle s and what its facet is called by have the same cells beside them, on the same sides, and the same plane. */
+static bool belongs_to(const rm_trimesh *m, rm_lid s, rm_lid facet)
+{
+  const rm_lid *side = m->side[facet / 2], *v = m->triangle[facet / 2], turned = facet & 1;
+  bool          flat = true;
+
+  for (int h = 0; h < 3; h++)
+    flat = flat && rm_orient3d(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], m->vertex[m->triangle[s][h]]) == 0;
+  return flat && m->side[s][0] == side[turned] && m->side[s][1] == side[!turned];
+}
+
+/* How many triangles of the facet of t have edge e. */
+static int times_in_facet(const rm_trimesh *m, rm_lid t, rm_lid e)
+{
+  rm_lid s = t;
+  int    n = 0;
+
+  do {
+    for (int h = 0; h < 3; h++) n += m->triangle_edge[s][h] == e;
+    s = rm_facet_next(m, s);
+  } while (s != t);
+  return n;
+}
+
+static bool facets_are_right(const rm_trimesh *m)
+{
+  for (rm_lid t = 0; t < m->num_triangles; t++) {
+    const rm_lid facet = rm_facet_of(m, t), next = rm_facet_next(m, t);
+    rm_lid       s = t, num = 0;
+
+    if (facet < 0 || facet / 2 >= m->num_triangles || next < 0 || next >= m->num_triangles) return false;
+    if (rm_facet_of(m, facet / 2) != facet - (facet & 1) || rm_facet_of(m, next) / 2 != facet / 2) return false;
+    if (!belongs_to(m, t, facet) || (next != t && m->triangle_is_skin[t])) return false;
+    while (num < RM_MAX_SIDES && (num == 0 || s != t)) s = rm_facet_next(m, s), num++;
+    if (s != t) return false;
+    for (int h = 0; h < 3; h++)
+      if (times_in_facet(m, t, m->triangle_edge[t][h]) != 1 + rm_is_inner(m, t, h)) return false;
+  }
+  return true;
+}
+
+/* The ring of edge e is its star, less what is inside facets, by facets. */
+static bool ring_is_right(const rm_trimesh *m, rm_lid e)
+{
+  rm_lid at = m->ring_offset[e];
+
+  for (rm_lid k = m->star_offset[e]; k < m->star_offset[e + 1]; k++) {
+    const rm_lid t = m->star[k] / 4, facet = rm_facet_of(m, t);
+    const int    h = m->star[k] & 3;
+
+    if (rm_is_inner(m, t, h)) continue;
+    if (at == m->ring_offset[e + 1] || m->ring[at] / 4 != facet / 2) return false;
+    if ((m->ring[at] >> 1 & 1) != ((h == 2) ^ (facet & 1))) return false;
+    at++;
+  }
+  return at == m->ring_offset[e + 1];
+}
+
+/* The panels of cell c are its triangles, those of quadrangles by two, with their corners about the normal. */
+static bool panels_are_right(const rm_trimesh *m, rm_lid c)
+{
+  const rm_lid first = m->cell_vertex_offset[c];
+  rm_lid       num = 0, at = m->panel_offset[c];
+
+  if (!m->panel_corner) return m->panel == m->cell_triangle && m->panel_offset == m->cell_triangle_offset;
+  for (rm_lid a = m->cell_triangle_offset[c]; a < m->cell_triangle_offset[c + 1] && m->cell_vertex_offset[c + 1] > first; a++) {
+    const rm_lid   t = m->cell_triangle[a] / 2, s = rm_facet_next(m, t);
+    const bool     is_half = s != t && rm_facet_next(m, s) == t;
+    const uint8_t *v = m->panel_corner[at];
+    rm_lid         x[4];
+
+    if (is_half && rm_facet_of(m, t) / 2 != t) continue;
+    if (at == m->panel_offset[c + 1] || m->panel[at++] != m->cell_triangle[a]) return false;
+    for (int h = 0; h < 4; h++) x[h] = m->cell_vertex[first + v[h]];
+    if (!is_half && (compare_lids(x, m->triangle[t], 3) || v[3] != v[2])) return false;
+    for (int h = 0; h < 4 && is_half; h++) { /* corners run as those of t do, and each side is one of the facet's */
+      const rm_lid p = x[h], q = x[(h + 1) & 3];
+      rm_lid       e = m->vertex_edge_offset[p];
+
+      while (e < m->vertex_edge_offset[p + 1] && m->edge[m->vertex_edge[e]][0] != q && m->edge[m->vertex_edge[e]][1] != q) e++;
+      if (e == m->vertex_edge_offset[p + 1] || times_in_facet(m, t, m->vertex_edge[e]) != 1) return false;
+      num += h < 3 && x[h] == m->triangle[t][num];
+    }
+    if (is_half && num < 2) return false;
+    num = 0;
+  }
+  return at == m->panel_offset[c + 1];
 }
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
@@ -236,10 +328,12 @@ remap_status rm_trimesh_check(const rm_frame *frame, const rm_trimesh *mesh)
 
   if (status == REMAP_OK &&
       !(vertices_are_right(mesh, frame) && triangles_are_right(mesh) && edges_are_right(mesh) && vertex_edges_are_right(mesh) &&
-        cell_triangles_are_right(mesh) && cells_are_closed(mesh, balance) && skin_is_right(mesh)))
+        facets_are_right(mesh) && cell_triangles_are_right(mesh) && cells_are_closed(mesh, balance) && skin_is_right(mesh)))
     status = REMAP_INTERNAL;
+  for (rm_lid e = 0; e < mesh->num_edges && status == REMAP_OK; e++)
+    if (!ring_is_right(mesh, e)) status = REMAP_INTERNAL;
   for (rm_lid c = 0; c < mesh->num_cells && status == REMAP_OK; c++)
-    if (!local_numbers_are_right(mesh, c)) status = REMAP_INTERNAL;
+    if (!local_numbers_are_right(mesh, c) || !panels_are_right(mesh, c)) status = REMAP_INTERNAL;
   rm_arena_drop(scratch);
   return status;
 }
