@@ -98,6 +98,10 @@ void bool_report_print(FILE *out, const bool_report *r)
   fprintf(out, "\n%-10s %12s %20s\n", "result", "cells", "volume");
   for (int k = 0; k < 3; k++) fprintf(out, "%-10s %12lld %20.12g\n", kind_word[k], (long long)r->cells[k], r->volume[k]);
   fprintf(out, "%lld faces, %lld nodes\n", (long long)r->view.global_faces, (long long)r->view.global_nodes);
+  for (int side = 0; side < 2; side++)
+    if (r->view.zone_overlap[side] > 0)
+      fprintf(out, "note: zones of %c overlap by rounding; a volume of %.3g that two of them have counts once\n", 'A' + side,
+              r->view.zone_overlap[side]);
   for (int b = 0; r->options->verbose && r->content && b < r->content->boundaries.num; b++)
     fprintf(out, "boundary   %s (%s)\n", r->content->boundaries.name[b], r->content->boundaries.type[b]);
   for (int k = 0; r->content && k < r->content->content.num_fields; k++)
@@ -123,10 +127,12 @@ static json_t *words(const char *text)
   return string;
 }
 
-static json_t *operand_json(const bool_operand *o)
+static json_t *operand_json(const bool_report *r, int side)
 {
-  json_t *json = json_pack("{s:o, s:s, s:I, s:i}", "file", words(o->path), "kind", o->is_surface ? "surface" : "mesh", "cells",
-                           (json_int_t)o->num_cells, "boundaries", o->boundaries.num);
+  const bool_operand *o    = &r->operand[side];
+  json_t             *json = json_pack("{s:o, s:s, s:I, s:i, s:f}", "file", words(o->path), "kind",
+                                       o->is_surface ? "surface" : "mesh", "cells", (json_int_t)o->num_cells, "boundaries",
+                                       o->boundaries.num, "zone_overlap", r->view.zone_overlap[side]);
 
   if (json && o->is_surface)
     json_object_set_new(json, "repairs",
@@ -162,7 +168,7 @@ static json_t *report_json(const bool_report *r)
 
   return json_pack("{s:s, s:i, s:s, s:o, s:o, s:o, s:{s:f, s:f, s:f, s:f}, s:{s:f, s:f, s:f, s:f, s:f, s:f, s:f}, s:{s:I}}",
                    "version", remap_version(), "ranks", r->ranks, "operation", r->options->operation, "a",
-                   operand_json(&r->operand[0]), "b", operand_json(&r->operand[1]), "result", result_json(r), "time", "read",
+                   operand_json(r, 0), "b", operand_json(r, 1), "result", result_json(r), "time", "read",
                    r->seconds_read, "supermesh", r->seconds_supermesh, "write", r->seconds_write, "total", r->seconds_total,
                    "supermesh_time", "partition", v->seconds_partition, "triangulation", v->seconds_triangulation, "crossings",
                    v->seconds_crossings, "polygons", v->seconds_polygons, "cells", v->seconds_cells, "faces", v->seconds_faces,

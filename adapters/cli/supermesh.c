@@ -44,6 +44,10 @@ cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
 
   cli_progress_set(j->progress, "supermesh", -1);
   CLI_TRY(cli_from_remap(j, remap_supermesh(j->ctx, NULL, &view), why));
+  for (int side = 0; side < 2; side++)
+    if (view.zone_overlap[side] > 0)
+      cli_note(j, "%s: zones overlap by rounding; a volume of %.3g that two of them have counts once in the supermesh",
+               j->options.path[side], view.zone_overlap[side]);
   row->cells  = view.global_cells;
   row->volume = 0;
   for (int64_t c = 0; c < view.num_cells; c++) row->volume += view.cell_volume[c];

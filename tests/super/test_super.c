@@ -429,6 +429,121 @@ static void concave_faces_are_cut(void)
   close_world(&w);
 }
 
+/* ---- zones whose faces do not match ------------------------------------------------------------------------------- */
+
+/* Move points within planes x = const, the sides of the unit cube within themselves. */
+static void slide(double xyz[3], const void *data)
+{
+  const double phase = *(const double *)data, y = xyz[1], z = xyz[2];
+
+  xyz[1] += .2 * y * (1 - y) * sin(3 * z + 5 * xyz[0] + phase);
+  xyz[2] += .2 * z * (1 - z) * sin(4 * y + 2 * xyz[0] - phase);
+}
+
+/* The zones of the second in the place of the first one's cells from x = 1/2 on. */
+static tm_mesh *three_zones(double phase)
+{
+  static const double halve[12] = {.5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, shift[12] = {.5, 0, 0, .5, 0, 1, 0, 0, 0, 0, 1, 0};
+  tm_mesh      *first = tm_hexahedra((int[]){2, 3, 4}, NULL, NULL), *whole;
+  tm_mesh      *rest  = tm_two_zones((int[]){2, 2, 3}, (int[]){1, 4, 2}, 0, NULL, NULL);
+  const int64_t left  = rest->zone_offset[1];
+
+  tm_move(first, tm_affine, halve);
+  tm_move(rest, tm_affine, shift);
+  whole = tm_join(first, rest);
+  tm_move(whole, slide, &phase);
+  free(whole->zone_offset), free(whole->zone_name);
+  whole->zone_offset    = tm_alloc_(4, sizeof *whole->zone_offset);
+  whole->zone_name      = tm_alloc_(3, sizeof *whole->zone_name);
+  whole->zone_offset[1] = 24;
+  whole->zone_offset[2] = 24 + left;
+  whole->zone_offset[3] = whole->view.num_cells;
+  for (int z = 0; z < 3; z++) whole->zone_name[z] = "one of three";
+  whole->view.num_zones = 3;
+  tm_view_(whole);
+  return whole;
+}
+
+static tm_mesh *patched(int side, uint64_t seed)
+{
+  const double phase = .3 * (double)seed;
+
+  if (side == 1 && seed == 3) return three_zones(phase);
+  if (side == 1) return tm_two_zones((int[]){2, 3, 4}, (int[]){3, 2 + (int)seed, 5}, 0, slide, &phase);
+  if (seed == 2) return tm_two_zones((int[]){2, 4, 3}, (int[]){2, 3, 2}, 0, slide, &(double){1.});
+  return warped(0, seed);
+}
+
+/* Faces with one cell, over all ranks, that lie in a plane x = const inside of the cube. */
+static int64_t gaping(const remap_supermesh_view *v)
+{
+  int64_t num = 0, beyond = 0;
+
+  for (int64_t f = 0; f < v->num_faces; f++) {
+    const double x    = v->node_xyz[3 * (int64_t)v->face_node[v->face_offset[f]]];
+    bool         flat = x > 0 && x < 1 && v->face_neighbour[f] < 0;
+
+    if (beyond < v->num_beyond && v->beyond_face[beyond] == f) beyond++, flat = false;
+    for (int64_t k = v->face_offset[f]; k < v->face_offset[f + 1] && flat; k++)
+      flat = v->node_xyz[3 * (int64_t)v->face_node[k]] == x;
+    num += flat;
+  }
+  return num;
+}
+
+static void zones_that_touch_need_no_matching_faces(void)
+{
+  for (uint64_t seed = 1; seed <= 4; seed++) {
+    const plan p = {patched, seed, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL,
+                    {UNION, seed == 4, 0, 1}, seed == 1, false};
+    world      w;
+
+    look(&p);
+    open_world(&w, MPI_COMM_SELF, &p);
+    RT_EQ(gaping(&w.v), 0);
+    RT_CHECK(w.v.zone_overlap[0] == 0);
+    RT_CHECK(w.v.zone_overlap[1] == 0);
+    close_world(&w);
+  }
+}
+
+static tm_mesh *by_a_little(int side, uint64_t seed)
+{
+  const double phase = .3, gap = seed == 1 ? -1e-13 : seed == 2 ? 1e-13 : seed == 3 ? -3e-8 : -.05;
+
+  return side ? tm_two_zones((int[]){2, 3, 4}, (int[]){3, 2, 5}, gap, slide, &phase) : warped(0, 1);
+}
+
+static void zones_that_overlap_by_rounding_count_once(void)
+{
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    const plan p = {by_a_little, seed, REMAP_FACES_CENTRE, {REMAP_IN_TARGET | REMAP_IN_BOTH, 0, 0, 1}, false, false};
+    world      w;
+    double     sum = 0;
+
+    look(&p);
+    open_world(&w, MPI_COMM_SELF, &p);
+    for (int64_t c = 0; c < w.v.num_cells; c++) sum += w.v.cell_volume[c];
+    RT_NEAR(sum, seed == 2 ? 1 - 1e-13 : 1, 1e-14);
+    RT_NEAR(w.v.zone_overlap[1], seed == 1 ? 1e-13 : seed == 2 ? 0 : 3e-8, 1e-15);
+    close_world(&w);
+  }
+}
+
+static void zones_that_overlap_by_more_are_refused_by_name(void)
+{
+  const plan p = {by_a_little, 4, REMAP_FACES_CENTRE, {UNION, 0, 0, 1}, false, true};
+  world      w;
+
+  open_world(&w, MPI_COMM_WORLD, &p);
+  RT_EQ(w.status, REMAP_ZONE_OVERLAP);
+  RT_CHECK(strstr(remap_message(w.ctx), "zone left: cell ") && strstr(remap_message(w.ctx), "overlaps cell "));
+  RT_CHECK(strstr(remap_message(w.ctx), "of zone right by more than rounding"));
+  close_world(&w);
+}
+
 RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothing_pass_through),
         RT_CASE(meshes_that_touch_in_every_way_are_the_same_on_any_ranks), RT_CASE(pieces_of_warped_faces_come_together),
-        RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut))
+        RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut),
+        RT_CASE(zones_that_touch_need_no_matching_faces), RT_CASE(zones_that_overlap_by_rounding_count_once),
+        RT_CASE(zones_that_overlap_by_more_are_refused_by_name))

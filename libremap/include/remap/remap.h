@@ -370,6 +370,9 @@ typedef struct remap_supermesh_view {
   const int64_t *cell_ancestor[2];  /**< [side][num_cells] global id of the cell of that mesh, -1: outside */
   const double  *cell_volume;       /**< [num_cells] of the exact cell, caller's unit cubed               */
 
+  double zone_overlap[2]; /**< [side] volume, over all ranks, of cells that lie in two zones of that mesh, which overlap by
+                               rounding; their ancestor is the cell of the zone that comes first */
+
   int64_t num_triangles[2]; /**< [side] this rank's, from here on: triangles of the faces that took part */
   int64_t num_crossings;    /**< edges of one mesh through triangles of the other */
   int64_t num_polygons;     /**< before pieces of a face were put together again  */
@@ -496,9 +499,11 @@ REMAP_API void remap_supermesh_options_default(remap_supermesh_options *options)
  *  read here and are lent until this returns; after a remap_build or remap_move it is made of the meshes as they stand.
  *  Neither the overlay nor a transfer is touched. Each rank makes an even share of the cells. A closed surface is a mesh of
  *  one cell. Cells of one mesh must not overlap, cross each other or be inverted; faces may be warped, coincide with others,
- *  have no area, and cells no volume. options must agree on all ranks; NULL means the defaults.
- *  Errors: BAD_ORDER (a mesh is missing), BAD_ARGUMENT, BAD_MESH, TOO_LARGE, NO_MEMORY, MPI_FAILURE, CANCELLED, INCONSISTENT;
- *  remap_message tells which cell, where it is one. */
+ *  have no area, and cells no volume. Zones of one mesh (num_zones) may touch without matching faces: they are joined first,
+ *  with the nodes that are missing, some rounded, in their faces. They may overlap by rounding too: see zone_overlap of the
+ *  view. options must agree on all ranks; NULL means the defaults.
+ *  Errors: BAD_ORDER (a mesh is missing), BAD_ARGUMENT, BAD_MESH, ZONE_OVERLAP (by more than rounding), TOO_LARGE, NO_MEMORY,
+ *  MPI_FAILURE, CANCELLED, INCONSISTENT; remap_message tells which cell, where it is one. */
 REMAP_API remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *options, remap_supermesh_view *out);
 
 /** Take what belongs to cells of one mesh over to the cells of the supermesh: out[c] = in[the ancestor of c in that mesh], or

@@ -44,7 +44,7 @@ static remap_status supermesh(remap_context *ctx, const remap_supermesh_options 
                               rm_reason *reason)
 {
   const rm_progress  progress = {ctx->options.progress, ctx->options.user};
-  const rm_super_job job      = {&ctx->comm, &ctx->frame, ctx->mesh, ctx->options.faces, options, &progress};
+  rm_super_job       job      = {&ctx->comm, &ctx->frame, ctx->mesh, {{0}, {0}}, ctx->options.faces, options, &progress};
   bool               is_new[2] = {true, true}, is_built = false;
 
   RM_TRY(agree_on_options(ctx, options, has_out, &is_built, reason));
@@ -54,6 +54,8 @@ static remap_status supermesh(remap_context *ctx, const remap_supermesh_options 
     rm_context_drop_place(ctx);
     RM_TRY(rm_context_read_meshes(ctx, is_new, passing, reason));
   }
+  for (int side = 0; side < 2; side++)
+    job.zones[side] = (rm_zones){ctx->labels[side].num_zones, ctx->labels[side].zone_cell_offset, ctx->labels[side].zone};
   return rm_super_build(ctx->super_arena, &job, &ctx->super, reason);
 }
 
@@ -90,63 +92,6 @@ remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *
 
 /* ---- what belongs to the operands -------------------------------------------------------------------------------- */
 
-/* Entities of other ranks that this rank wants. */
-typedef struct wants {
-  int64_t  num;
-  rm_lid  *at;   /* [num] entity of the supermesh */
-  int     *rank; /* [num] ascending */
-  rm_lid  *item; /* [num] */
-} wants;
-
-/* Those of n entities that have an origin, by its rank. */
-static remap_status sort_wants(rm_arena *passing, int64_t n, const int32_t *from, const int32_t *from_rank, wants *out)
-{
-  rm_keyed *key, *spare;
-
-  out->num = 0;
-  RM_NEW(key, passing, n);
-  RM_NEW(spare, passing, n);
-  for (int64_t k = 0; k < n; k++)
-    if (from_rank[k] >= 0) key[out->num++] = (rm_keyed){(uint64_t)from_rank[k], k};
-  rm_sort_keyed(key, spare, out->num);
-  RM_NEW(out->at, passing, out->num);
-  RM_NEW(out->rank, passing, out->num);
-  RM_NEW(out->item, passing, out->num);
-  for (int64_t k = 0; k < out->num; k++) {
-    out->at[k]   = (rm_lid)key[k].item;
-    out->rank[k] = (int)key[k].key;
-    out->item[k] = from[key[k].item];
-  }
-  return REMAP_OK;
-}
-
-/* Entities of a supermesh, and where they come from. */
-typedef struct origins {
-  int64_t        num;
-  const int32_t *from, *from_rank; /* [num] */
-} origins;
-
-/* out[k] = in[origin of k], `size` bytes each, *none where there is none; untouched after a failure. Collective. */
-static remap_status fetch(const rm_comm *comm, rm_arena *passing, const origins *of, size_t size, const void *in,
-                          const void *none, void *out)
-{
-  const rm_plan *plan;
-  wants          w = {0};
-  char          *received = NULL, *buffer = NULL;
-  remap_status   status;
-
-  RM_TRY(rm_comm_agree(comm, sort_wants(passing, of->num, of->from, of->from_rank, &w), NULL));
-  RM_TRY(rm_plan_build(comm, passing, w.num, w.rank, w.item, &plan));
-  received = rm_arena_alloc(passing, w.num, size);
-  buffer   = rm_arena_alloc(passing, plan->send_offset[plan->num_send], size);
-  status   = received && buffer ? REMAP_OK : REMAP_NO_MEMORY;
-  RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_TRY(rm_comm_agree(comm, rm_plan_run(comm, plan, size, in, received, buffer), NULL));
-  for (int64_t k = 0; k < of->num; k++) memcpy((char *)out + (size_t)k * size, none, size);
-  for (int64_t k = 0; k < w.num; k++) memcpy((char *)out + (size_t)w.at[k] * size, received + (size_t)k * size, size);
-  return REMAP_OK;
-}
-
 /* What can be wrong with a call of the two functions below on this rank. Not collective. */
 static remap_status may_carry(const remap_context *ctx, remap_side side, bool faces, const void *in, const void *out,
                               rm_reason *reason)
@@ -166,24 +111,20 @@ static remap_status may_carry(const remap_context *ctx, remap_side side, bool fa
 static remap_status carry(remap_context *ctx, remap_side side, bool faces, size_t size, const void *in, const void *none,
                           void *out)
 {
-  rm_reason    reason  = {-1, -1, ""};
-  rm_arena    *passing = rm_arena_new();
-  remap_status status  = may_carry(ctx, side, faces, in, out, &reason);
+  rm_reason    reason = {-1, -1, ""};
+  remap_status status = may_carry(ctx, side, faces, in, out, &reason);
 
   ctx->message[0] = '\0';
-  if (status == REMAP_OK && !passing) status = REMAP_NO_MEMORY;
   const remap_status entered = rm_context_enter(ctx, RM_CALL_SUPERMESH_VALUES, 2 * (int)side + faces, &reason);
 
   status = entered == REMAP_OK ? rm_comm_agree_reason(&ctx->comm, status, &reason) : entered;
   if (status == REMAP_OK) {
     const rm_super *s = ctx->super;
-    const origins   of =
-        faces ? (origins){s->view.num_faces, s->view.face_from[side], s->view.face_from_rank[side]}
-              : (origins){s->view.num_cells, s->cell_home[side], s->cell_rank[side]};
 
-    status = fetch(&ctx->comm, passing, &of, size, in, none, out);
+    status = faces ? rm_super_fetch(&ctx->comm, s->view.num_faces, s->view.face_from[side], s->view.face_from_rank[side], size,
+                                    in, none, out)
+                   : rm_super_fetch(&ctx->comm, s->view.num_cells, s->cell_home[side], s->cell_rank[side], size, in, none, out);
   }
-  rm_arena_drop(passing);
   if (status != REMAP_OK) rm_context_explain(ctx, status, &reason);
   return status;
 }

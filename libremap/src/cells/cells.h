@@ -72,6 +72,10 @@ static inline const rm_lid *rm_cells_beyond(const rm_cells *cells, rm_lid f)
   return cells->face_cell[f][1] < RM_OUTSIDE ? cells->beyond[-2 - cells->face_cell[f][1]] : NULL;
 }
 
+/* A point off the plane of a, b, c, on the side that its normal points to; false if they are on one line. Exact. Not
+ * collective. */
+bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3]);
+
 /* False if the corners of triangle t are on a line. Exact. Not collective. */
 bool rm_has_area(const rm_trimesh *m, rm_lid t);
 

@@ -82,9 +82,6 @@ static inline bool rm_in_triangle(const rm_limit *l, int side, rm_feature f, rm_
 
 /* ---- exact signs ------------------------------------------------------------------------------------------------- */
 
-/* A point off the plane of a, b, c, on the side that its normal points to; false if they are on one line. */
-bool rm_off_plane(const double a[3], const double b[3], const double c[3], double o[3]);
-
 /* The spot as the meeting of a line and a plane: ends of the line, three points of the plane; false if it is a vertex, then
  * line[0] is that. */
 bool rm_spot_meeting(const rm_limit *l, const rm_spot *spot, double line[2][3], double plane[3][3]);

@@ -1,5 +1,6 @@
 /* super -- the stages in order: cover, triangulation, crossings, cells, cells that pass, numbers. Where what was made does
- * not fit cells that would pass, which is rare, the first four are done again for all cells. */
+ * not fit cells that would pass, which is rare, the first four are done again for all cells. Before all that, zones are joined
+ * whose faces do not match. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -149,7 +150,7 @@ static void add_figures(const remap_supermesh_view *figures, remap_supermesh_vie
   view->seconds_numbering     = figures->seconds_numbering;
 }
 
-remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
+remap_status rm_super_make(rm_arena *arena, const rm_super_job *job, rm_super **out, rm_reason *reason)
 {
   work         w   = {.job = job};
   rm_super    *new = rm_arena_zero(arena, 1, sizeof *new);
@@ -163,5 +164,35 @@ remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_s
 done:
   drop_passing(&w);
   rm_soup_free(&w.soup);
+  return status;
+}
+
+remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
+{
+  rm_arena      *own[2]   = {rm_arena_new(), rm_arena_new()};
+  const rm_mesh *mesh[2]  = {job->mesh[0], job->mesh[1]};
+  rm_conformed   whole[2] = {{.mesh = NULL}, {.mesh = NULL}};
+  rm_super_job   whole_job = *job;
+  rm_super      *super;
+  remap_status   status = rm_comm_agree(job->comm, own[0] && own[1] ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+
+  whole_job.mesh = mesh;
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
+    status = rm_super_conform(&own[side], job, side, &whole[side], reason);
+    if (whole[side].mesh) mesh[side] = whole[side].mesh;
+  }
+  if (status == REMAP_OK) {
+    status = rm_super_make(arena, &whole_job, &super, reason);
+    if (status != REMAP_OK && reason->side >= 0 && whole[reason->side].mesh)
+      rm_super_trace_reason(job->comm, &whole[reason->side], reason);
+  }
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
+    const double unit = 1 / job->frame->scale;
+
+    super->view.zone_overlap[side] = whole[side].overlap * unit * unit * unit;
+    if (whole[side].mesh) status = rm_super_retrace(arena, job->comm, side, &whole[side], super);
+  }
+  if (status == REMAP_OK) *out = super;
+  for (int side = 0; side < 2; side++) rm_arena_drop(own[side]);
   return status;
 }

@@ -4,8 +4,8 @@
  * Every rank takes a core of cells that meet the other mesh, with all that touches them (rm_part_cover), overlays, and keeps
  * the supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are
  * made of and not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and
- * numbered in one order. O(n log n) time; on top of what room cells needs, some 400 bytes for each cell of the result while
- * it is numbered. */
+ * numbered in one order. Zones of one mesh that touch without matching faces are joined first, in the same way. O(n log n)
+ * time; on top of what room cells needs, some 400 bytes for each cell of the result while it is numbered. */
 #ifndef RM_SUPER_H
 #define RM_SUPER_H
 
@@ -17,11 +17,19 @@ typedef struct rm_super {
   const int           *cell_rank[2]; /* [side][num_cells] that rank, -1                              */
 } rm_super;
 
+/* The zones of a mesh, as in remap_mesh. */
+typedef struct rm_zones {
+  int64_t            num;
+  const int64_t     *cell_offset; /* [num + 1] */
+  const char *const *name;        /* [num]     */
+} rm_zones;
+
 /* What it is made of, the same on all ranks. */
 typedef struct rm_super_job {
   const rm_comm                 *comm;
   const rm_frame                *frame;
   const rm_mesh *const          *mesh; /* [side] */
+  rm_zones                       zones[2];
   remap_faces                    faces;
   const remap_supermesh_options *options;
   const rm_progress             *progress; /* may be NULL */
@@ -29,5 +37,10 @@ typedef struct rm_super_job {
 
 /* Collective. Lives in arena. Failures are those of remap_supermesh, the same on every rank. */
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason);
+
+/* out[k] = in[item from[k] of rank from_rank[k]], `size` bytes each, *none where that rank is -1, for k < n; untouched after a
+ * failure. Collective. */
+remap_status rm_super_fetch(const rm_comm *comm, int64_t n, const int32_t *from, const int32_t *from_rank, size_t size,
+                            const void *in, const void *none, void *out);
 
 #endif

@@ -5,7 +5,10 @@
  *   pass.c    cells that meet nothing of the other mesh, and the faces they share with cells that do
  *   number.c  numbers of equal keys over all ranks
  *   finish.c  the soup numbered and put in order
- *   super.c   all of it */
+ *   super.c   all of it
+ *   contacts.c  zones of a mesh that touch where faces do not match
+ *   conform.c   such a mesh made conformal
+ *   fetch.c     what belongs to cells and faces of other ranks */
 #ifndef RM_SUPER_PRIVATE_H
 #define RM_SUPER_PRIVATE_H
 
@@ -94,6 +97,38 @@ remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const
  * lexicographical order of the keys. number is [n]. Collective. Working memory from passing. O(n) for n keys mostly. */
 remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
                              int64_t *total);
+
+/* Where a cell or face comes from. */
+typedef struct rm_origin {
+  rm_gid global; /* of a cell      */
+  rm_lid home;   /* number there   */
+  int    rank;   /* -1: from none  */
+} rm_origin;
+
+/* A mesh made of another one. */
+typedef struct rm_conformed {
+  const rm_mesh   *mesh;
+  const rm_origin *cell; /* [mesh->num_cells]     */
+  const rm_origin *face; /* [faces as it was given them] */
+  double           overlap; /* volume that two zones of the other one hold, over all ranks */
+} rm_conformed;
+
+/* The zone of a cell. */
+int64_t rm_zone_of(const rm_zones *zones, rm_gid cell);
+
+/* Colours of the zones of one mesh, [zones], from 0; different where zones touch and faces do not match. Collective. */
+remap_status rm_super_colour_zones(const rm_super_job *job, int side, int64_t *colour, int *num_colours, rm_reason *reason);
+
+/* One mesh made conformal; out->mesh is NULL if it is. *arena, where it lives, may become another. Collective. ZONE_OVERLAP
+ * where zones overlap by more than rounding, BAD_MESH where they cannot be joined. */
+remap_status rm_super_conform(rm_arena **arena, const rm_super_job *job, int side, rm_conformed *out, rm_reason *reason);
+/* The cell of a reason as one of the mesh that was made conformal. Collective. */
+void rm_super_trace_reason(const rm_comm *comm, const rm_conformed *mesh, rm_reason *reason);
+/* Ancestors in the mesh that was made conformal. Collective. */
+remap_status rm_super_retrace(rm_arena *arena, const rm_comm *comm, int side, const rm_conformed *from, rm_super *super);
+
+/* The supermesh of meshes whose cells do not overlap and whose faces match. Collective. As rm_super_build. */
+remap_status rm_super_make(rm_arena *arena, const rm_super_job *job, rm_super **out, rm_reason *reason);
 
 /* Number the soup and put it in order. Collective. *out lives in arena. The soup is used up. BAD_MESH if vertices of it that
  * are not the same lie in one place, or more than two faces. */

@@ -23,4 +23,10 @@ works 1 intersection "$data/maia_U_ATB_45_NGON_v42.cgns" "$data/maia_U_ATB_45_NG
 [ "$(value result boundaries 0)" = wall ] || complain "no wall"
 checked atb.cgns
 hold "$wrong" "boundary conditions of elements and of polyhedra come through"
+
+works 1 imprint "$data/pycgns_naca12_hybrid_sol.cgns" core.obj -o naca.cgns --report report.json
+near "$(value a zone_overlap)" 4.7702295e-7 1e-6
+near "$(value result volume)" 260.185832 1e-9
+checked naca.cgns
+hold "$wrong" "zones that overlap by rounding are joined, and what two of them have counts once"
 finish

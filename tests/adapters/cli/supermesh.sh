@@ -24,6 +24,16 @@ near "$(value source volume)" 1 1e-14
 hold "$wrong" "what is written is a mesh that remap reads"
 works 2 -q good.cgns half.cgns -o out.cgns --supermesh super.vtu && grep -q 'NumberOfCells' super.vtu
 hold $? "a name in .vtu gives VTK"
+"$tools/make_demo" . 6 >/dev/null || complain "make_demo fails"
+for n in 1 2 3 4; do
+  works "$n" -q source.cgns target.cgns -o out.cgns --supermesh "on$n.cgns" --report report.json
+  cmp -s on1.cgns "on$n.cgns" || complain "other bytes on $n ranks"
+done
+near "$(value supermesh volume)" 1 1e-14
+[ "$(value supermesh cells)" -ge "$(value overlap pairs)" ] || complain "fewer cells than pairs"
+works 1 -q on1.cgns target.cgns -o back.cgns -f Volume --report report.json
+near "$(value source volume)" 1 1e-14
+hold "$wrong" "zones of TARGET that touch without matching faces are joined"
 refused 2 "result.cgns" "the supermesh must not be OUTPUT" good.cgns mesh.cgns --supermesh ./out/result.cgns -o out/result.cgns
 refused 2 "good.cgns" "the supermesh must not be SOURCE" good.cgns mesh.cgns --supermesh good.cgns -o out/result.cgns
 refused 5 "absent/super.cgns" "where it cannot be written is told first" \
