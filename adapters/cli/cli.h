@@ -7,6 +7,7 @@
  *   volumes.c   cell volumes of the solvers
  *   priority.c  zones of SOURCE that overlap
  *   coverage.c  how much of the cells is covered
+ *   verify.c    is the result good enough to be written
  *   check.c     --check
  *   supermesh.c --supermesh
  *   job.c       what these share

@@ -117,6 +117,10 @@ cli_exit cli_masks_settle(cli_job *j, cli_failure *why);
  *  something that a solver can read. With --on-uncovered fill=VALUE they get that. Collective. */
 void cli_masks_fill(cli_job *j);
 
+/** Is the result as good as it must be? What is to blame where a field is not conserved goes to the remarks too. Collective.
+ *  Errors: VERIFY, INTERNAL. */
+cli_exit cli_verify(cli_job *j, cli_failure *why);
+
 /** Write the supermesh that was asked for, after remap_build: fills supermesh of the report. Collective. Errors: GEOMETRY, IO,
  *  INTERNAL. */
 cli_exit cli_supermesh_write(cli_job *j, cli_failure *why);

@@ -172,34 +172,6 @@ static cli_exit transfer(cli_job *j, cli_failure *why)
   return CLI_DONE;
 }
 
-/* Is the result as good as it must be? Written so that a NaN fails. */
-static cli_exit verify(const cli_job *j, cli_failure *why)
-{
-  const remap_stats *stats = &j->report.stats;
-
-  for (int side = 0; side < 2; side++) {
-    const rcgns_info      *info = j->report.info[side];
-    const int64_t          cell = stats->worst_closure_cell[side];
-    const rcgns_zone_info *zone = cli_zone_of(info, cell);
-
-    if (stats->max_closure_error[side] <= CLI_MAX_CLOSURE) continue;
-    return cli_fail(
-        why, CLI_VERIFY,
-        "%s: zone %s: cell %lld (counted from 1): its overlaps sum up to its volume only within %.1e, the bar is %.0e: "
-        "nothing is written; see whether the mesh folds there",
-        info->path, zone->name, (long long)(cell - zone->first_cell + 1), stats->max_closure_error[side], CLI_MAX_CLOSURE);
-  }
-  for (int k = 0; k < j->num_fields; k++) {
-    const double error = j->row[k].what.conservation_error;
-
-    if (error <= CLI_MAX_CONSERVATION || (j->options.allow_nan && isnan(error))) continue;
-    return cli_fail(why, CLI_VERIFY,
-                    "%s: field %s is conserved only within %.1e, the bar is %.0e: nothing is written; see whether a mesh folds",
-                    j->options.path[REMAP_SOURCE], j->row[k].name, error, CLI_MAX_CONSERVATION);
-  }
-  return CLI_DONE;
-}
-
 /* ---- the end ------------------------------------------------------------------------------------------------------ */
 
 /* The fields and, with --coverage, phi. Collective. */
@@ -294,13 +266,13 @@ static cli_exit run(cli_job *j, cli_failure *why)
   if (speaks) cli_report_overlap(stdout, &j->report);
   if (speaks) cli_report_cover(stdout, &j->report);
   if (j->options.check) {
-    verified = verify(j, why);
+    verified = cli_verify(j, why);
     if (verified == CLI_DONE) verified = cli_check(j, why);
     return report_even_if(j, verified, why);
   }
   CLI_TRY(transfer(j, why));
   if (speaks) cli_report_fields(stdout, &j->report);
-  verified = verify(j, why);
+  verified = cli_verify(j, why);
   if (verified != CLI_DONE) return report_even_if(j, verified, why);
   if (j->options.supermesh) CLI_TRY(cli_supermesh_write(j, why));
   CLI_TRY(write_output(j, why));

@@ -24,7 +24,11 @@ refused 3 far.cgns "meshes that do not meet are refused" good.cgns far.cgns -o o
 refused 3 "half.cgns.*cell" "uncovered cells are refused if asked" good.cgns half.cgns -o out/result.cgns --on-uncovered error
 refused 3 "half.cgns.*cell" "partly covered cells are refused if asked" \
   good.cgns half.cgns -o out/result.cgns --on-partial error
-refused 4 "wide.cgns.*Density" "a result that is not conservative is not written" wide.cgns bow_tie.cgns -o out/result.cgns
+refused 4 "wide.cgns.*Density.*bow_tie.cgns: zone Base/Zone: cell 1 .*inside out" \
+  "a result that is not conservative is not written, and the cell to blame is named" wide.cgns bow_tie.cgns -o out/result.cgns
+run 2 wide.cgns bow_tie.cgns -o out/result.cgns --report report.json
+[ "$code" = 4 ] && grep -q "bow_tie.cgns: zone Base/Zone: cell 1 .*inside out" report.json
+hold $? "so does the report"
 refused 5 absent.txt "a missing transform is named" good.cgns mesh.cgns -o out/result.cgns --transform absent.txt
 refused 5 eleven.txt "a transform of 11 numbers is refused" good.cgns mesh.cgns -o out/result.cgns --transform eleven.txt
 refused 5 word.txt "a transform with a word in it is refused" good.cgns mesh.cgns -o out/result.cgns --transform word.txt
