@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { NOTE = sizeof(rm_note) };
+enum { NOTE = sizeof(rm_note), SPARE = 8 }; /* bytes behind what was received: readers may take numbers in twos */
 
 /* Messages that follow a first one of so many bytes of items, and the length of that. */
 static int64_t num_pieces(int64_t bytes, int64_t chunk)
@@ -43,7 +43,7 @@ remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan 
     num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->recv_offset, i, most), chunk));
   RM_NEW(flow.sent, arena, start_of(plan->send_offset, plan->num_send, most));
   RM_NEW(flow.arrived, arena, plan->num_recv);
-  RM_NEW(flow.received, arena, rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most));
+  RM_NEW(flow.received, arena, rm_add_sat(rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most), SPARE));
   RM_NEW(flow.first, arena, plan->num_recv);
   RM_NEW(flow.rest, arena, plan->num_recv);
   RM_NEW(flow.request, arena, num_requests);

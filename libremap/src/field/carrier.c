@@ -27,7 +27,8 @@ struct rm_carrier {
   rm_flow           taken;              /* values that uncovered cells take                             */
   const rm_nearest *nearest;            /* NULL: nobody takes any                                       */
   double           *value;              /* [receiving cells][num_fields] old values, then new ones      */
-  double           *room;               /* [6][num_fields]                                              */
+  double           *room;               /* [5][num_fields]                                              */
+  double           *content;            /* [RM_FEW_CELLS][num_fields]                                   */
   uint8_t          *is_plain;           /* [receiving cells] of rm_find_plain                           */
   rm_integral      *integral;           /* [num_fields]                                                 */
   double           *extreme;            /* [4][num_fields] least, least, greatest, greatest              */
@@ -64,8 +65,8 @@ static remap_status make_keeping(rm_arena *arena, rm_carrier *c)
   const rm_transfer_setup *setup = &c->setup;
   const int64_t            num   = rm_mul_sat(setup->receiving->num_cells, c->load.num_fields);
 
-  RM_NEW(c->kept, arena, num);
-  if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, num);
+  RM_NEW(c->kept, arena, rm_add_sat(num, 1)); /* one more, here and below: lanes.h */
+  if (c->load.num_systems > 0) RM_NEW(c->kept_number, arena, rm_add_sat(num, 1));
   c->keeping.ground = (rm_ground){.mesh       = setup->receiving,
                                   .stencil    = setup->keeping_stencil,
                                   .rows       = setup->rows,
@@ -84,10 +85,11 @@ static remap_status make_room(rm_arena *arena, rm_carrier *c)
   const size_t             bytes  = (size_t)n * sizeof(double);
 
   RM_TRY(make_packing(arena, &c->load, &c->packing));
-  RM_NEW(c->given, arena, rm_mul_sat(setup->giving->num_cells, n));
-  if (c->load.num_systems > 0) RM_NEW(c->number, arena, rm_mul_sat(setup->giving->num_cells, n));
+  RM_NEW(c->given, arena, rm_add_sat(rm_mul_sat(setup->giving->num_cells, n), 1)); /* one more, here and below: lanes.h */
+  if (c->load.num_systems > 0) RM_NEW(c->number, arena, rm_add_sat(rm_mul_sat(setup->giving->num_cells, n), 1));
   RM_NEW(c->value, arena, rm_mul_sat(setup->receiving->num_cells, n));
-  RM_NEW(c->room, arena, 6 * (int64_t)n);
+  RM_NEW(c->room, arena, 5 * (int64_t)n);
+  RM_NEW(c->content, arena, RM_FEW_CELLS * (int64_t)n);
   RM_NEW(c->is_plain, arena, setup->receiving->num_cells);
   RM_NEW(c->integral, arena, n);
   RM_NEW(c->extreme, arena, 4 * (int64_t)n);
@@ -219,7 +221,8 @@ static remap_status gather(rm_carrier *c)
 /* Give what is packed to those who receive it. */
 static void give(rm_carrier *c)
 {
-  rm_word_post(&c->word, c->setup.comm, &c->given_flow, (size_t)c->packing.width * sizeof(double), c->giving.pack);
+  rm_word_post(&c->word, c->setup.comm, &c->given_flow, (size_t)c->packing.width * sizeof(double),
+               rm_profile_gives(&c->giving, &c->packing));
 }
 
 void rm_carrier_start(rm_carrier *c, const remap_transfer *how, int num_fields, const remap_field_desc *fields, uint64_t mark,
@@ -289,6 +292,7 @@ static void carry(rm_carrier *c, bool wants_integral)
                             .packing  = &c->packing,
                             .value    = c->value,
                             .room     = c->room,
+                            .content  = c->content,
                             .is_plain = c->is_plain,
                             .keeping  = blends(c) ? &c->keeping : NULL,
                             .integral = wants_integral ? c->integral : NULL};

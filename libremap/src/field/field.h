@@ -63,7 +63,7 @@ typedef struct rm_transfer_setup {
   const double *giving_measure, *receiving_measure; /* [cells] the solver's volumes over those of the mesh; NULL: 1   */
   /* [cells] 1: the cell and its giver are the same, but not their volumes for the solver: amounts are no copies; NULL: none */
   const uint8_t *giving_differs, *receiving_differs;
-  bool          any_partial, any_uncovered;         /* such receiving cells exist on some rank           */
+  bool           any_partial, any_uncovered; /* such receiving cells exist on some rank           */
 } rm_transfer_setup;
 
 /* Are roles, vectors and the gas model such that fields can be moved together? BAD_ARGUMENT with the reason. Not collective. */

@@ -1,6 +1,7 @@
 /* field_private -- between the files of the room.
  *
  *   stencil, widen  neighbours and their weights                     leastsq, quadratic  the weights of one cell
+ *   fit             slopes and curvature in one cell
  *   reconstruct     cells of a mesh: value, slope, bounds            smooth    where a field is smooth
  *   profile         reconstruction with its messages                 packing   what travels, and where it stands
  *   system          fields that are converted and moved together     admit     states that can be
@@ -13,6 +14,7 @@
 
 #include "field.h"
 
+#include <float.h>
 #include <math.h>
 
 /* ---- leastsq --------------------------------------------------------------------------------------------------- */
@@ -174,11 +176,22 @@ static inline rm_around rm_around_of(rm_numbers numbers, int f, int num)
   return (rm_around){numbers.own ? numbers.own + f : NULL, numbers.halo ? numbers.halo + f : NULL, num};
 }
 
-/* Least-squares slope over the vertex neighbours, scaled; bounds become least and greatest value of the cell and them. */
-void rm_fit_slope(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double bounds[2]);
+/* In line, unlike isfinite. */
+static inline bool rm_is_finite(double x) { return fabs(x) <= DBL_MAX; }
 
-/* Slope and curvature, with its constant, of the quadratic polynomial, scaled; the stencil is widened. False if there is none:
- * slope stays as it is and curvature is 0. */
+/* ---- fit ------------------------------------------------------------------------------------------------------- */
+
+/* Fits of the fields in one cell, scaled, row by row: written for all but flags. */
+typedef struct rm_fit {
+  double *slope;  /* [3][num_fields] */
+  double *bounds; /* [2][num_fields] least and greatest value of the cell and its neighbours, if the transfer asks for them */
+} rm_fit;
+
+/* Least-squares slopes over the vertex neighbours. Not collective. */
+void rm_fit_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_lid cell, rm_numbers numbers, rm_fit out);
+
+/* Slope and curvature, with its constant, of the quadratic polynomial of one field, scaled; the stencil is widened. False if
+ * there is none: slope stays as it is and curvature is 0. */
 bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7]);
 
 /* A mesh whose fields are reconstructed. */
@@ -200,12 +213,13 @@ void rm_reconstruct(const rm_profile *profile, const rm_packing *packing, uint8_
 
 /* ---- smooth ---------------------------------------------------------------------------------------------------- */
 
-/* Slopes of all own cells and, fourth, the range of values around them, [cells][num_fields][4], scaled. Not collective. */
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[4]);
+/* Slopes of all own cells and, fourth, the range of values around them, scaled, [cells][4][num_fields]; least and greatest
+ * value around, [cells][2][num_fields]. Not collective. */
+void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double *slope, double *bounds);
 
 /* 1 for own cells that are rough, 0 for others, [giving cells][num_fields]. Not collective. */
 void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         const double (*slope)[4], const double (*halo_slope)[4], double *rough);
+                         rm_numbers slope, double *rough);
 
 /* Cells are smooth if none within so many layers of neighbours is rough. */
 enum { RM_ROUGH_LAYERS = 3 };
@@ -245,10 +259,11 @@ static inline const double *rm_flow_numbers(const rm_flow *flow) { return (const
 
 /* profile -- the fields of one mesh reconstructed, again and again. It owns flows and room; values are the carrier's. */
 struct rm_profile {
-  rm_ground ground;
-  rm_flow   halo;               /* numbers around the stencils                                    */
-  rm_flow   slopes, roughs;     /* likewise slopes and roughness, if smooth cells are told from others */
-  double (*slope)[4];           /* [cells][num_fields]                                            */
+  rm_ground     ground;
+  rm_flow       halo;           /* numbers around the stencils                                    */
+  rm_flow       slopes, roughs; /* likewise slopes and roughness, if smooth cells are told from others */
+  double       *slope, *bounds; /* [cells][4][num_fields], [cells][2][num_fields] of rm_smooth_slopes */
+  double       *line;           /* [7][num_fields] of one cell                                    */
   double       *rough, *spread; /* [cells][num_fields] 1: a cell that is rough, or near one; spread is the last layer */
   uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
   const double *given;          /* [cells][num_fields] values as the caller has them              */
@@ -262,6 +277,9 @@ struct rm_profile {
 remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *profile);
 /* Does a transfer read the halo? */
 bool rm_profile_reads_halo(const rm_packing *packing);
+/* What giving cells give, [cells][width]: the pack, or the values as they are if nothing else travels; the pack is not filled
+ * then. */
+const double *rm_profile_gives(const rm_profile *profile, const rm_packing *packing);
 /* Send the halo's numbers. What can be done without them is done before rm_profile_finish. Among neighbours. */
 void rm_profile_post(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
 /* Receive them and make the whole pack. Among neighbours. */
@@ -416,11 +434,14 @@ remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const r
 
 /* ---- rows ------------------------------------------------------------------------------------------------------ */
 
-/* What a receiving cell gets, scaled: content [num_fields] of u V + g.M + h:S over its row, but for flags. got as in
- * rm_receipt. Not collective. O(pairs of the row) per field. */
-void rm_sum_row(const rm_packing *packing, const rm_rows *rows, const double *got, rm_lid cell, double *content);
+/* What receiving cells get, scaled: content [end - first][num_fields] of u V + g.M + h:S over the rows of cells first to
+ * end - 1, but for flags. got as in rm_receipt. Not collective. O(pairs of the rows) per field. */
+void rm_sum_rows(const rm_packing *packing, const rm_rows *rows, const double *got, rm_lid first, rm_lid end, double *content);
 
 /* ---- receive --------------------------------------------------------------------------------------------------- */
+
+/* Cells that receive before others do. */
+enum { RM_FEW_CELLS = 64 };
 
 /* One transfer on the receiving side. */
 struct rm_receipt {
@@ -430,7 +451,8 @@ struct rm_receipt {
   const rm_packing        *packing;
   const double            *got;      /* [givers of the rows][width]                               */
   double                  *value;    /* [receiving cells][num_fields] old values, then new ones   */
-  double                  *room;     /* [6][num_fields]                                           */
+  double                  *room;     /* [5][num_fields]                                           */
+  double                  *content;  /* [RM_FEW_CELLS][num_fields]                                */
   const uint8_t           *is_plain; /* [receiving cells] of rm_find_plain                        */
   const rm_profile        *keeping;  /* of old content; NULL: nobody blends, or there are no slopes */
   rm_integral             *integral; /* [num_fields], NULL: nobody wants them                     */

@@ -3,7 +3,6 @@
  * cache meanwhile. O(cells) per field. */
 #include "field_private.h"
 
-#include <float.h>
 #include <stdio.h>
 
 /* Cells next to each other, at most FEW, of one block. */
@@ -63,9 +62,6 @@ static remap_status bad_value(const rm_packing *packing, int f, const rm_mesh *m
                  label_of(packing, f).text, which, value);
 }
 
-/* In line, unlike isfinite. */
-static inline bool is_finite(double x) { return fabs(x) <= DBL_MAX; }
-
 /* What is wrong among these values of field f in the cells of a strip, the first of them at x; num_fields from one cell's to
  * the next one's. */
 static remap_status bad_values(const rm_packing *packing, int f, const rm_mesh *mesh, const strip *s, const double *x,
@@ -73,7 +69,7 @@ static remap_status bad_values(const rm_packing *packing, int f, const rm_mesh *
 {
   rm_lid i = s->first;
 
-  while (is_finite(x[(int64_t)(i - s->first) * packing->num_fields])) i++;
+  while (rm_is_finite(x[(int64_t)(i - s->first) * packing->num_fields])) i++;
   return bad_value(packing, f, mesh, i, x[(int64_t)(i - s->first) * packing->num_fields], which, reason);
 }
 
@@ -95,7 +91,7 @@ remap_status rm_gather_given(const rm_transfer_setup *setup, const rm_packing *p
         const double value = cover[i] != REMAP_UNWANTED ? in[spot_of(place, i)] : 0.0;
 
         *at = value;
-        is_good &= is_finite(value);
+        is_good &= rm_is_finite(value);
       }
       if (!is_good && !packing->how->allow_nan) return bad_values(packing, f, mesh, &s, to, "the", reason);
     }
@@ -123,7 +119,7 @@ remap_status rm_gather_old(const rm_transfer_setup *setup, const rm_packing *pac
         if (cover[i] == REMAP_COVERED || !rm_keeps_old(packing->how, field, cover[i])) continue;
         const double old = out[spot_of(place, i)];
 
-        if (!is_finite(old) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, old, "the old", reason);
+        if (!rm_is_finite(old) && !packing->how->allow_nan) return bad_value(packing, f, mesh, i, old, "the old", reason);
         value[(int64_t)i * packing->num_fields + f] = old;
       }
     }

@@ -1,6 +1,6 @@
 /* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the
  * limiter auto slopes, then which cells are rough, thrice; with systems a reduction over all ranks. O(neighbours) per cell and
- * field; 16 to 56 bytes per cell and field, 48 more for auto, 56 more for polynomials of degree 2. */
+ * field; 16 to 56 bytes per cell and field, 64 more for auto, 56 more for polynomials of degree 2. */
 #include "field_private.h"
 
 void rm_word_add(rm_word *word, remap_status status)
@@ -69,6 +69,7 @@ remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, r
   RM_NEW(p->pack, arena, rm_mul_sat(cells, load->width));
   RM_NEW(p->limited, arena, 2 * (int64_t)n);
   RM_NEW0(p->extreme, arena, 2 * (int64_t)n);
+  RM_NEW(p->line, arena, 7 * (int64_t)n + 1);
   if (load->has_slopes) {
     RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->halo));
     mark_halo_cells(p->ground.stencil, p->needs_halo);
@@ -76,7 +77,8 @@ remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, r
   if (!load->is_checked) return REMAP_OK;
   RM_TRY(rm_flow_init(arena, plan, stream, 4 * bytes, &p->slopes));
   RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->roughs));
-  RM_NEW(p->slope, arena, rm_mul_sat(cells, n));
+  RM_NEW(p->slope, arena, rm_add_sat(rm_mul_sat(4 * (int64_t)cells, n), 1)); /* one more: lanes.h */
+  RM_NEW(p->bounds, arena, rm_mul_sat(2 * (int64_t)cells, n));
   RM_NEW(p->rough, arena, rm_mul_sat(cells, n));
   RM_NEW(p->spread, arena, rm_mul_sat(cells, n));
   return REMAP_OK;
@@ -90,6 +92,13 @@ bool rm_profile_reads_halo(const rm_packing *packing)
   return reads;
 }
 
+const double *rm_profile_gives(const rm_profile *p, const rm_packing *packing)
+{
+  const bool is_bare = packing->width == packing->num_fields && packing->num_systems == 0 && !p->ground.measure;
+
+  return is_bare ? p->given : p->pack;
+}
+
 void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
   const size_t bytes = (size_t)packing->num_fields * sizeof(double);
@@ -97,7 +106,7 @@ void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packi
   for (int f = 0; f < 2 * packing->num_fields; f++) p->limited[f] = 0;
   if (rm_profile_reads_halo(packing)) {
     rm_word_post(word, comm, &p->halo, bytes, p->number);
-  } else if (word->note.status == REMAP_OK) {
+  } else if (word->note.status == REMAP_OK && rm_profile_gives(p, packing) == p->pack) {
     rm_reconstruct(p, packing, 0);
     rm_reconstruct(p, packing, 1);
   }
@@ -110,12 +119,12 @@ static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *pa
   const size_t      bytes   = (size_t)packing->num_fields * sizeof(double);
   const rm_numbers  numbers = {p->number, rm_flow_numbers(&p->halo)};
 
-  if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope);
+  if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope, p->bounds);
   rm_word_post(word, comm, &p->slopes, 4 * bytes, p->slope);
   rm_word_await(word, comm, &p->slopes);
   if (word->note.status == REMAP_OK)
-    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (const double(*)[4])p->slope,
-                        (const double(*)[4])(const void *)p->slopes.received, p->rough);
+    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (rm_numbers){p->slope, rm_flow_numbers(&p->slopes)},
+                        p->rough);
   for (int layer = 0; layer < RM_ROUGH_LAYERS; layer++) {
     double *const before = p->rough;
 

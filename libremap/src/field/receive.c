@@ -58,7 +58,10 @@ static row_sums measure_row(const rm_rows *rows, rm_lid cell)
 }
 
 /* Where the contents of a cell's row are, [num_fields]. */
-static double *content_of(const rm_receipt *w) { return w->room + 5 * w->packing->num_fields; }
+static double *content_of(const rm_receipt *w, rm_lid cell)
+{
+  return w->content + (int64_t)(cell % RM_FEW_CELLS) * w->packing->num_fields;
+}
 
 static bool is_copied(const rm_receipt *w, int f, rm_lid cell)
 {
@@ -72,9 +75,9 @@ static double measure_of(const rm_receipt *w, int f, rm_lid cell)
 }
 
 /* row: as measured; contents of the cell's row have been summed. */
-static row_sums sums_of(const rm_receipt *w, int f, const row_sums *row)
+static row_sums sums_of(const rm_receipt *w, int f, rm_lid cell, const row_sums *row)
 {
-  return (row_sums){content_of(w)[f], row->volume, row->magnitude};
+  return (row_sums){content_of(w, cell)[f], row->volume, row->magnitude};
 }
 
 /* True if a volume is what cancellation left of the parts it is made of: nothing may be divided by it. */
@@ -237,7 +240,7 @@ static double receive(const rm_receipt *w, int f, rm_lid cell, const row_sums *r
 
   if (w->fields[f].nature == REMAP_FLAG) return receive_flag(w, f, cell);
   if (!is_copied(w, f, cell)) {
-    s = sums_of(w, f, row);
+    s = sums_of(w, f, cell, row);
     if (!is_normalised(w, f, cell)) {
       const double kept = is_blend(w, f, cell) ? kept_content(w, f, cell, old, &s) : 0.0;
 
@@ -270,7 +273,7 @@ static void normalise_system(const rm_receipt *w, int system, rm_lid cell, const
 
     mean[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s       = sums_of(w, f, row);
+    s       = sums_of(w, f, cell, row);
     mean[f] = is_void_row(w, cell, &s) ? plain_mean(w, f, cell, &s) : s.content / s.volume;
     if (p->degree[f] > 0 && !is_void_row(w, cell, &s)) change[f] = mean_taken_beyond(w, f, cell, &s) - mean[f];
     if (w->integral) rm_integral_add(&w->integral[f].minus_target, -1.0, s.content);
@@ -293,7 +296,7 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const row_
 
     kept[f] = change[f] = 0.0;
     if (p->system_of[f] != system) continue;
-    s = sums_of(w, f, row);
+    s = sums_of(w, f, cell, row);
     add_kept(w, f, cell, old[f], &s, &kept[f], &change[f]);
     volume = w->setup->receiving->cell_volume[cell] - s.volume;
   }
@@ -329,7 +332,7 @@ static void receive_system(const rm_receipt *w, int system, rm_lid cell, const r
       value[f] = given[p->at[f]];
       continue;
     }
-    s        = sums_of(w, f, row);
+    s        = sums_of(w, f, cell, row);
     value[f] = receive_content(w, f, cell, value[f], kept[f], &s, integral_of(w, f)) / RM_VALUE_SCALE;
   }
 }
@@ -360,25 +363,24 @@ void rm_find_plain(const rm_transfer_setup *setup, uint8_t *is_plain)
   }
 }
 
-/* The new values of a plain cell, but for flags and systems. */
+/* The new values of a plain cell, but for systems. */
 static void receive_plain(const rm_receipt *w, rm_lid cell, double *value)
 {
   const rm_packing *p       = w->packing;
-  const double     *content = content_of(w), volume = w->setup->receiving->cell_volume[cell];
+  const double     *content = content_of(w, cell), volume = w->setup->receiving->cell_volume[cell];
 
-  for (int i = 0; i < p->num_spans; i++) {
-    const int first = p->span[i].first, end = first + p->span[i].num;
+  for (int f = 0; f < p->num_fields; f++) {
+    const double measure = measure_of(w, f, cell);
 
-    if (p->system_of[first] >= 0) continue;
-    if (w->setup->receiving_measure)
-      for (int f = first; f < end; f++) value[f] = content[f] / (volume * measure_of(w, f, cell)) / RM_VALUE_SCALE;
-    else
-      for (int f = first; f < end; f++) value[f] = content[f] / volume / RM_VALUE_SCALE;
-    for (int f = first; f < end && w->integral; f++)
-      rm_integral_add(&w->integral[f].minus_target, -(RM_VALUE_SCALE * value[f]) * measure_of(w, f, cell), volume);
+    if (p->system_of[f] >= 0) continue;
+    if (w->fields[f].nature == REMAP_FLAG) {
+      value[f] = receive_flag(w, f, cell);
+      continue;
+    }
+    const double scaled = content[f] / (volume * measure);
+    if (w->integral) rm_integral_add(&w->integral[f].minus_target, -scaled * measure, volume);
+    value[f] = scaled / RM_VALUE_SCALE;
   }
-  for (int f = 0; f < p->num_fields && p->num_flags > 0; f++)
-    if (w->fields[f].nature == REMAP_FLAG) value[f] = receive_flag(w, f, cell);
 }
 
 /* The new values of an uncovered cell, but for those that it takes from the nearest. */
@@ -388,15 +390,13 @@ static void receive_nothing(const rm_receipt *w, double *value)
     if (!rm_keeps_old(w->how, &w->fields[f], REMAP_UNCOVERED)) value[f] = w->how->fill_value;
 }
 
-/* The new values of a mapped cell. */
+/* The new values of a mapped cell whose row is summed. */
 static void receive_all(const rm_receipt *w, rm_lid cell, double *value)
 {
-  const rm_rows    *rows = w->setup->rows;
-  const rm_packing *p    = w->packing;
-  row_sums          row  = {0.0, 0.0, 0.0};
+  const rm_packing *p   = w->packing;
+  row_sums          row = {0.0, 0.0, 0.0};
 
-  if (!w->is_plain[cell] || p->num_systems > 0) row = measure_row(rows, cell);
-  rm_sum_row(p, rows, w->got, cell, content_of(w));
+  if (!w->is_plain[cell] || p->num_systems > 0) row = measure_row(w->setup->rows, cell);
   if (w->is_plain[cell])
     receive_plain(w, cell, value);
   else
@@ -404,7 +404,7 @@ static void receive_all(const rm_receipt *w, rm_lid cell, double *value)
       if (p->system_of[f] < 0) value[f] = receive(w, f, cell, &row, value[f]);
   for (int s = 0; s < p->num_systems; s++) receive_system(w, s, cell, &row, value);
   if (p->num_systems == 0) return;
-  if (rm_is_copied(rows, w->setup->receiving_differs, cell, true))
+  if (rm_is_copied(w->setup->rows, w->setup->receiving_differs, cell, true))
     integrate_copies(w, cell, value);
   else
     rm_system_restore(p, value);
@@ -412,14 +412,23 @@ static void receive_all(const rm_receipt *w, rm_lid cell, double *value)
 
 void rm_receive(const rm_receipt *w)
 {
-  const rm_rows *rows = w->setup->rows;
+  const rm_packing *p         = w->packing;
+  const rm_rows    *rows      = w->setup->rows;
+  const bool        is_simple = p->num_systems + p->num_flags == 0 && !w->setup->receiving_measure && !w->integral;
 
-  for (rm_lid c = 0; c < rows->num_cells; c++) { /* all fields of a cell in turn: its row is read once */
-    double *value = w->value + (int64_t)c * w->packing->num_fields;
+  for (rm_lid first = 0, end; first < rows->num_cells; first = end) { /* few cells at a time: what is summed stays at hand */
+    end = rows->num_cells - first > RM_FEW_CELLS ? first + RM_FEW_CELLS : rows->num_cells;
+    rm_sum_rows(p, rows, w->got, first, end, w->content);
+    for (rm_lid c = first; c < end; c++) { /* all fields of a cell in turn */
+      const double volume = w->setup->receiving->cell_volume[c], *content = content_of(w, c);
+      double      *value = w->value + (int64_t)c * p->num_fields;
 
-    if (rows->cover[c] == REMAP_UNCOVERED)
-      receive_nothing(w, value);
-    else if (rows->cover[c] != REMAP_UNWANTED)
-      receive_all(w, c, value);
+      if (is_simple && w->is_plain[c])
+        for (int f = 0; f < p->num_fields; f++) value[f] = content[f] / volume / RM_VALUE_SCALE;
+      else if (rows->cover[c] == REMAP_UNCOVERED)
+        receive_nothing(w, value);
+      else if (rows->cover[c] != REMAP_UNWANTED)
+        receive_all(w, c, value);
+    }
   }
 }

@@ -1,78 +1,98 @@
 /* rows -- what receiving cells get from their pairs: sums over a row of u V + g.M + h:S, for all fields of a transfer.
  *
- * The row is read once for every few fields next to each other (a span), whose sums stay in registers; the products of a pair
- * are added up side by side, value, slope and curvature, which the compiler turns into vectors, the same for any number of
- * fields. Pairs are added in row order, so the sums are those of any partition: plainly within runs of 32 pairs, where rounding
- * takes little, runs with compensation, so that rows of any length keep all digits. O(pairs) per field. */
+ * A row is read once for every few fields next to each other (a span), whose sums stay in registers; the products of a pair
+ * are added up side by side, value, slope and curvature, the same for any number of fields. Pairs are added in row order, so
+ * the sums are those of any partition: plainly within runs of 32 pairs, where rounding takes little, runs with compensation, so
+ * that rows of any length keep all digits. O(pairs) per field. */
 #include "field_private.h"
+#include "lanes.h"
 
-enum { RUN = 32, MOST = RM_SPAN_FIELDS };
+enum { RUN = 32, MOST = RM_SPAN_FIELDS, AHEAD = 64, LINE = 8 };
 
 /* Pairs next to each other in a row. */
 typedef struct run {
   const rm_rows *rows;
-  const double  *got; /* of the span's first field in giver 0 */
-  int64_t        width, first, end;
+  const double  *got;                     /* of the span's first field in giver 0 */
+  int64_t        width, first, end, last; /* last: pair of all rows */
 } run;
 
-/* The sums over a run, of num fields without slopes, whose values are side by side. */
-static inline void add_values(const run *r, int num, double *content)
+/* Fetch `num` numbers of the giver so many pairs ahead, since where they stand no processor can guess. */
+RM_UNROLLED void fetch_ahead(const run *r, int64_t k, int64_t num)
 {
-  const rm_lid *giver     = r->rows->giver;
-  const double *volume    = r->rows->volume;
-  double        sum[MOST] = {0.0};
+  const double *place = r->got + r->rows->giver[k + AHEAD < r->last ? k + AHEAD : r->last] * r->width;
 
+  for (int64_t i = 0; i < num; i += LINE) __builtin_prefetch(place + i);
+  __builtin_prefetch(place + num - 1);
+}
+
+/* The sums over a run, of num fields without slopes, whose values are side by side. */
+RM_UNROLLED void add_values(const run *r, int num, double *content)
+{
+  const rm_lid *giver  = r->rows->giver;
+  const double *volume = r->rows->volume;
+  const int     twos   = (num + 1) / 2;
+  rm_lanes      sum[MOST / 2];
+
+  for (int t = 0; t < twos; t++) sum[t] = rm_lanes_of(0.0);
   for (int64_t k = r->first; k < r->end; k++) {
-    const double *u = r->got + giver[k] * r->width, scaled = RM_VALUE_SCALE * volume[k];
+    const double  *u  = r->got + giver[k] * r->width;
+    const rm_lanes by = rm_lanes_of(RM_VALUE_SCALE * volume[k]);
 
-    for (int f = 0; f < num; f++) sum[f] += u[f] * scaled;
+    for (int t = 0; t < twos; t++) sum[t] += rm_lanes_at(u + 2 * t) * by;
   }
-  for (int f = 0; f < num; f++) content[f] = sum[f];
+  for (int t = 0; t < twos; t++) rm_lanes_put(sum[t], num - 2 * t, content + 2 * t);
 }
 
 /* Likewise of fields with slopes, `stride` apart. */
-static inline void add_slopes(const run *r, int num, int64_t stride, double *content)
+RM_UNROLLED void add_slopes(const run *r, int num, int64_t stride, double *content)
 {
   const rm_lid *giver      = r->rows->giver;
   const double *volume     = r->rows->volume;
   const double(*moment)[3] = r->rows->moment;
-  double sum[MOST][4]      = {{0.0}};
+  rm_lanes low[MOST], high[MOST];
 
+  for (int f = 0; f < num; f++) low[f] = high[f] = rm_lanes_of(0.0);
   for (int64_t k = r->first; k < r->end; k++) {
-    const double *place = r->got + giver[k] * r->width;
-    const double  by[4] = {RM_VALUE_SCALE * volume[k], moment[k][0], moment[k][1], moment[k][2]};
+    const double  *place  = r->got + giver[k] * r->width;
+    const rm_lanes by_low = {RM_VALUE_SCALE * volume[k], moment[k][0]}, by_high = rm_lanes_at(moment[k] + 1);
 
-    for (int f = 0; f < num; f++)
-      for (int i = 0; i < 4; i++) sum[f][i] += place[f * stride + i] * by[i];
+    if (num > 1) fetch_ahead(r, k, num * stride);
+    for (int f = 0; f < num; f++) {
+      low[f] += rm_lanes_at(place + f * stride) * by_low;
+      high[f] += rm_lanes_at(place + f * stride + 2) * by_high;
+    }
   }
-  for (int f = 0; f < num; f++) content[f] = sum[f][0] + (sum[f][1] + (sum[f][2] + sum[f][3]));
+  for (int f = 0; f < num; f++) content[f] = low[f][0] + (low[f][1] + (high[f][0] + high[f][1]));
 }
 
 /* Likewise of fields with curvature, which stands `beyond` the value. */
-static inline void add_curvatures(const run *r, int num, int64_t stride, int beyond, double *content)
+RM_UNROLLED void add_curvatures(const run *r, int num, int64_t stride, int beyond, double *content)
 {
-  const rm_rows *rows         = r->rows;
-  double         sum[MOST][4] = {{0.0}}, form[MOST][4] = {{0.0}};
+  const rm_rows *rows = r->rows;
+  rm_lanes       low[MOST], high[MOST], form[MOST];
 
+  for (int f = 0; f < num; f++) low[f] = high[f] = form[f] = rm_lanes_of(0.0);
   for (int64_t k = r->first; k < r->end; k++) {
-    const double *place = r->got + rows->giver[k] * r->width, *m = rows->moment[k], *s = rows->second[k];
-    const double  volume = rows->volume[k], by[4] = {RM_VALUE_SCALE * volume, m[0], m[1], m[2]};
+    const double  *place = r->got + rows->giver[k] * r->width, *m = rows->moment[k], *s = rows->second[k];
+    const double   volume = rows->volume[k];
+    const rm_lanes by_low = {RM_VALUE_SCALE * volume, m[0]}, by_high = rm_lanes_at(m + 1);
+    const rm_lanes second[3] = {rm_lanes_at(s), rm_lanes_at(s + 2), rm_lanes_at(s + 4)};
 
+    fetch_ahead(r, k, num * stride);
     for (int f = 0; f < num; f++) {
-      const double *u = place + f * stride, *h = u + beyond;
+      const double  *u = place + f * stride, *h = u + beyond;
+      const rm_lanes constant = {h[6] * volume, 0.0};
 
-      for (int i = 0; i < 4; i++) sum[f][i] += u[i] * by[i];
-      for (int i = 0; i < 2; i++) form[f][i] += h[i] * s[i] + h[i + 2] * s[i + 2];
-      for (int i = 0; i < 2; i++) form[f][i + 2] += h[i + 4] * s[i + 4];
-      form[f][2] += h[6] * volume;
+      low[f] += rm_lanes_at(u) * by_low;
+      high[f] += rm_lanes_at(u + 2) * by_high;
+      form[f] += ((rm_lanes_at(h) * second[0] + rm_lanes_at(h + 2) * second[1]) + rm_lanes_at(h + 4) * second[2]) + constant;
     }
   }
-  for (int f = 0; f < num; f++)
-    content[f] = sum[f][0] + ((sum[f][1] + (sum[f][2] + sum[f][3])) + ((form[f][0] + form[f][1]) + (form[f][2] + form[f][3])));
+  for (int f = 0; f < num; f++) content[f] = low[f][0] + ((low[f][1] + (high[f][0] + high[f][1])) + (form[f][0] + form[f][1]));
 }
 
 /* Any of these; num is a constant where this is called, so that each case gets loops of its own. */
-static inline void add_run(const run *r, int degree, int num, int64_t stride, int beyond, double *content)
+RM_UNROLLED void add_run(const run *r, int degree, int num, int64_t stride, int beyond, double *content)
 {
   if (degree == 0)
     add_values(r, num, content);
@@ -82,37 +102,86 @@ static inline void add_run(const run *r, int degree, int num, int64_t stride, in
     add_curvatures(r, num, stride, beyond, content);
 }
 
-static void sum_run(const run *r, const rm_packing *p, const rm_span *span, double *content)
+/* Runs of a long row, with compensation between them. */
+RM_UNROLLED void add_runs(const run *row, int degree, int num, int64_t stride, int beyond, double *content)
 {
-  const int degree = span->degree, beyond = rm_pack_curvature(p->has_bounds), stride = rm_pack_width(degree, p->has_bounds);
+  rm_compensated total[MOST] = {{0.0, 0.0}};
 
-  switch (span->num) {
-    case 1: add_run(r, degree, 1, stride, beyond, content); break;
-    case 2: add_run(r, degree, 2, stride, beyond, content); break;
-    case 3: add_run(r, degree, 3, stride, beyond, content); break;
-    default: add_run(r, degree, MOST, stride, beyond, content);
+  for (int64_t first = row->first; first < row->end; first += RUN) {
+    const run r = {row->rows, row->got, row->width, first, row->end - first > RUN ? first + RUN : row->end, row->last};
+    double    part[MOST];
+
+    add_run(&r, degree, num, stride, beyond, part);
+    for (int f = 0; f < num; f++) rm_compensated_add(&total[f], part[f]);
+  }
+  for (int f = 0; f < num; f++) content[f] = rm_compensated_value(&total[f]);
+}
+
+/* The fields of a span in some cells. */
+typedef struct patch {
+  const rm_packing *packing;
+  const rm_span    *span;
+  const rm_rows    *rows;
+  const double     *got;
+  rm_lid            first, end;
+} patch;
+
+RM_UNROLLED void sum_patch(const patch *w, int degree, int num, double *content)
+{
+  const rm_packing *p      = w->packing;
+  const int64_t    *offset = w->rows->offset, stride = rm_pack_width(degree, p->has_bounds);
+  const int         beyond = rm_pack_curvature(p->has_bounds);
+
+  for (rm_lid c = w->first; c < w->end; c++, content += p->num_fields) {
+    const run row = {w->rows, w->got, p->width, offset[c], offset[c + 1], offset[w->rows->num_cells] - 1};
+
+    if (row.end - row.first <= RUN)
+      add_run(&row, degree, num, stride, beyond, content);
+    else
+      add_runs(&row, degree, num, stride, beyond, content);
   }
 }
 
-void rm_sum_row(const rm_packing *p, const rm_rows *rows, const double *got, rm_lid cell, double *content)
+static void sum_values(const patch *w, double *content)
 {
-  const int64_t first = rows->offset[cell], end = rows->offset[cell + 1];
+  switch (w->span->num) {
+    case 1: sum_patch(w, 0, 1, content); break;
+    case 2: sum_patch(w, 0, 2, content); break;
+    case 3: sum_patch(w, 0, 3, content); break;
+    default: sum_patch(w, 0, MOST, content);
+  }
+}
 
+static void sum_slopes(const patch *w, double *content)
+{
+  switch (w->span->num) {
+    case 1: sum_patch(w, 1, 1, content); break;
+    case 2: sum_patch(w, 1, 2, content); break;
+    case 3: sum_patch(w, 1, 3, content); break;
+    default: sum_patch(w, 1, MOST, content);
+  }
+}
+
+static void sum_curvatures(const patch *w, double *content)
+{
+  switch (w->span->num) {
+    case 1: sum_patch(w, 2, 1, content); break;
+    case 2: sum_patch(w, 2, 2, content); break;
+    case 3: sum_patch(w, 2, 3, content); break;
+    default: sum_patch(w, 2, MOST, content);
+  }
+}
+
+void rm_sum_rows(const rm_packing *p, const rm_rows *rows, const double *got, rm_lid first, rm_lid end, double *content)
+{
   for (int i = 0; i < p->num_spans; i++) {
-    const rm_span *span        = &p->span[i];
-    run            r           = {rows, got + p->at[span->first], p->width, first, end};
-    rm_compensated total[MOST] = {{0.0, 0.0}};
-    double         part[MOST];
+    const rm_span *span = &p->span[i];
+    const patch    w    = {p, span, rows, got + p->at[span->first], first, end};
 
-    if (end - first <= RUN) {
-      sum_run(&r, p, span, content + span->first);
-      continue;
+    switch (span->degree) {
+      case 0: sum_values(&w, content + span->first); break;
+      case 1: sum_slopes(&w, content + span->first); break;
+      default: sum_curvatures(&w, content + span->first);
     }
-    for (; r.first < end; r.first = r.end) {
-      r.end = end - r.first > RUN ? r.first + RUN : end;
-      sum_run(&r, p, span, part);
-      for (int f = 0; f < span->num; f++) rm_compensated_add(&total[f], part[f]);
-    }
-    for (int f = 0; f < span->num; f++) content[span->first + f] = rm_compensated_value(&total[f]);
   }
 }

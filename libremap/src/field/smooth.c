@@ -14,61 +14,91 @@
  *
  * Slopes and ranges of other ranks' cells come in one exchange, roughness in three. O(neighbours) per cell and field. */
 #include "field_private.h"
+#include "lanes.h"
 
 #include <string.h>
 
 static const double ROUGH = 0.2;
 
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double (*slope)[4])
+void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double *slope, double *bounds)
 {
   const int num = packing->num_fields;
 
-  for (rm_lid c = 0; c < stencil->num_cells; c++)
+  for (rm_lid c = 0; c < stencil->num_cells; c++, slope += 4 * num, bounds += 2 * num) {
+    rm_fit_slopes(stencil, packing, c, given, (rm_fit){slope, bounds});
     for (int f = 0; f < num; f++) {
       const rm_around u = rm_around_of(given, f, num);
-      double          bounds[2], curvature[7], *g = slope[(int64_t)c * num + f];
+      double          g[3], curvature[7];
 
-      if (packing->order[f] > 1) rm_fit_slope(stencil, c, &u, g, bounds);
-      if (packing->order[f] > 2) (void)rm_fit_quadratic(stencil, c, &u, g, curvature);
-      if (packing->order[f] > 1) g[3] = bounds[1] - bounds[0];
+      if (packing->order[f] < 2) continue;
+      slope[3 * num + f] = bounds[num + f] - bounds[f];
+      if (packing->order[f] < 3 || !rm_fit_quadratic(stencil, c, &u, g, curvature)) continue;
+      for (int d = 0; d < 3; d++) slope[d * num + f] = g[d];
     }
+  }
 }
 
-/* Is a cell rough in field number f? */
-static bool is_rough(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, int f, int num, const rm_around *u,
-                     const double (*slope)[4], const double (*halo_slope)[4])
+enum { TWOS = RM_SPAN_FIELDS / 2 };
+
+/* Errors and ranges of one cell in 2 twos fields, of which the first one's numbers are at u and slopes at g. */
+RM_UNROLLED void errors_of_twos(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, int twos, const rm_around *u,
+                                const rm_around *g, rm_lanes error[TWOS], rm_lanes range[TWOS])
 {
-  const double  value = rm_value_at(u, stencil->num_cells, cell);
-  const double *c = mesh->cell_centroid[cell], *g = slope[(int64_t)cell * num + f];
-  double        error = 0.0, range = 0.0;
+  const int64_t  num   = u->stride;
+  const rm_lid   cells = stencil->num_cells;
+  const double  *slope = g->own + cell * g->stride, *c = mesh->cell_centroid[cell];
+  const rm_lanes scale = rm_lanes_of(RM_VALUE_SCALE);
+  rm_lanes       value[TWOS], most[TWOS], widest[TWOS], own[3][TWOS];
 
-  for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++) {
-    const rm_lid  n     = stencil->neighbour[k];
-    const bool    own   = n < stencil->num_cells;
-    const double *x     = own ? mesh->cell_centroid[n] : stencil->halo_centroid[n - stencil->num_cells];
-    const double *other = own ? slope[(int64_t)n * num + f] : halo_slope[(int64_t)(n - stencil->num_cells) * num + f];
-    const double  rise  = rm_value_at(u, stencil->num_cells, n) - value;
-    double        told  = 0.0;
-
-    for (int d = 0; d < 3; d++) told += 0.5 * (g[d] + other[d]) * (x[d] - c[d]);
-    error = fmax(error, fabs(rise - told));
-    range = fmax(range, other[3]);
+  for (int t = 0; t < twos; t++) {
+    most[t] = widest[t] = rm_lanes_of(0.0);
+    value[t]            = scale * rm_lanes_at(u->own + cell * num + 2 * t);
+    for (int d = 0; d < 3; d++) own[d][t] = rm_lanes_at(slope + d * num + 2 * t);
   }
-  return error > ROUGH * range;
+  for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
+    const rm_lid   n       = stencil->neighbour[k];
+    const bool     is_own  = n < cells;
+    const double  *x       = is_own ? mesh->cell_centroid[n] : stencil->halo_centroid[n - cells];
+    const double  *there   = is_own ? u->own + n * num : u->halo + (n - cells) * num;
+    const double  *other   = is_own ? g->own + n * g->stride : g->halo + (n - cells) * g->stride;
+    const rm_lanes half[3] = {rm_lanes_of(0.5 * (x[0] - c[0])), rm_lanes_of(0.5 * (x[1] - c[1])),
+                              rm_lanes_of(0.5 * (x[2] - c[2]))};
+
+    for (int t = 0; t < twos; t++) {
+      rm_lanes wrong = scale * rm_lanes_at(there + 2 * t) - value[t], told = (own[0][t] + rm_lanes_at(other + 2 * t)) * half[0];
+
+      for (int d = 1; d < 3; d++) told += (own[d][t] + rm_lanes_at(other + d * num + 2 * t)) * half[d];
+      wrong     = rm_lanes_magnitude(wrong - told);
+      most[t]   = rm_lanes_greatest(wrong, most[t]);
+      widest[t] = rm_lanes_greatest(rm_lanes_at(other + 3 * num + 2 * t), widest[t]);
+    }
+  }
+  for (int t = 0; t < twos; t++) {
+    error[t] = most[t];
+    range[t] = widest[t];
+  }
 }
 
 void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         const double (*slope)[4], const double (*halo_slope)[4], double *rough)
+                         rm_numbers slope, double *rough)
 {
   const int num = packing->num_fields;
 
-  for (rm_lid c = 0; c < stencil->num_cells; c++)
-    for (int f = 0; f < num; f++) {
-      const rm_around u = rm_around_of(given, f, num);
+  for (rm_lid c = 0; c < stencil->num_cells; c++) {
+    for (int f = 0; f < num && packing->num_flags > 0; f++) rough[(int64_t)c * num + f] = 0.0;
+    for (int i = 0; i < packing->num_spans; i++) {
+      const int       first = packing->span[i].first;
+      const rm_around u = rm_around_of(given, first, num), g = {slope.own + first, slope.halo + first, 4 * (int64_t)num};
+      double         *at = rough + (int64_t)c * num + first;
+      rm_lanes        error[TWOS], range[TWOS];
 
-      rough[(int64_t)c * num + f] =
-          packing->order[f] > 1 && is_rough(stencil, mesh, c, f, num, &u, slope, halo_slope) ? 1.0 : 0.0;
+      if (packing->span[i].num > 2)
+        errors_of_twos(stencil, mesh, c, TWOS, &u, &g, error, range);
+      else
+        errors_of_twos(stencil, mesh, c, 1, &u, &g, error, range);
+      for (int f = 0; f < packing->span[i].num; f++) at[f] = error[f / 2][f % 2] > ROUGH * range[f / 2][f % 2] ? 1.0 : 0.0;
     }
+  }
 }
 
 void rm_smooth_spread(const rm_ground *ground, const uint8_t *needs_halo, const rm_packing *packing, rm_numbers rough,
