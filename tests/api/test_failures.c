@@ -1,6 +1,6 @@
 /* One rank fails, at every place where it can: memory that runs out at its n-th request, a callback that cancels, data that are
  * wrong. Every rank returns the same status, none waits for another for ever, and the context is good for another try. */
-#include <remap/remap.h>
+#include "api/context.h"
 #include "meshes.h"
 #include "rt.h"
 
@@ -190,7 +190,9 @@ static void exhaust(work what)
   bool  comes  = true;
   world w;
 
-  open_world(&w, what == BUILD ? 6 : what == MOVE ? 4 : what == SYSTEMS ? 3 : 2, what); /* 6: large enough for arrays with blocks of their own */
+  open_world(&w, what == BUILD ? 6 : what == MOVE ? 4 : what == SYSTEMS ? 3 : 2, what); /* 6: large enough for arrays with
+                                                                                           blocks of their own */
+  w.ctx->slicing = (rm_slicing){4000 / rt_size(), INFINITY}; /* the build of the largest has two rounds or three */
   for (int n = 0; comes && n < 2000; n++) {
     remap_status status;
 

@@ -1,6 +1,6 @@
 /* The bits of one rank on any number of ranks: pairs, fields, reports and statistics, for partitions and numberings by lot,
- * with the caller's global ids and without, masked and moved. */
-#include <remap/remap.h>
+ * with the caller's global ids and without, masked and moved; and in one round or in many, of a few cells each. */
+#include "api/context.h"
 #include "meshes.h"
 #include "rt.h"
 
@@ -46,7 +46,8 @@ static tm_mesh *make(int side, uint64_t seed)
   return m;
 }
 
-static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids)
+/* triangles: of the cells that are overlaid at once, about; 0: as the library does. */
+static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids, int64_t triangles)
 {
   static const double turned[12] = {.96, -.28, 0, .1, .28, .96, 0, -.1, 0, 0, 1, .05};
   const remap_motion  motion[2]  = {{NULL, NULL}, {NULL, turned}};
@@ -56,6 +57,7 @@ static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids)
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &size);
   RT_EQ(remap_create(comm, NULL, &w->ctx), REMAP_OK);
+  if (triangles) w->ctx->slicing = (rm_slicing){triangles, INFINITY};
   for (int side = 0; side < 2; side++) {
     tm_mesh *whole = make(side, seed);
     int     *deal  = tm_deal(whole, size, seed % 3 ? TM_RANDOM : TM_SLABS, seed);
@@ -127,13 +129,13 @@ static void sum_rows(world *w, int d, double *by_id)
   }
 }
 
-static void look(uint64_t seed, bool has_ids)
+static void look(uint64_t seed, bool has_ids, int64_t triangles)
 {
   world       alone, together;
   remap_stats s[2];
 
-  open_world(&alone, MPI_COMM_SELF, seed, true);
-  open_world(&together, MPI_COMM_WORLD, seed, has_ids);
+  open_world(&alone, MPI_COMM_SELF, seed, true, 0);
+  open_world(&together, MPI_COMM_WORLD, seed, has_ids, triangles);
   RT_EQ(remap_get_stats(alone.ctx, &s[0]), REMAP_OK);
   RT_EQ(remap_get_stats(together.ctx, &s[1]), REMAP_OK);
   RT_CHECK(s[0].pairs > 0 && s[0].pairs == s[1].pairs);
@@ -166,16 +168,22 @@ static uint64_t num_seeds(void) { return rt_long() ? 40 : rt_size() > 8 ? 2 : 6;
 
 static void everything_has_the_bits_of_one_rank_with_ids(void)
 {
-  for (uint64_t seed = 1; seed <= num_seeds(); seed++) look(seed, true);
+  for (uint64_t seed = 1; seed <= num_seeds(); seed++) look(seed, true, 0);
 }
 static void everything_has_the_bits_of_one_rank_without_ids(void)
 {
-  for (uint64_t seed = 101; seed <= 100 + num_seeds(); seed++) look(seed, false);
+  for (uint64_t seed = 101; seed <= 100 + num_seeds(); seed++) look(seed, false, 0);
 }
 static void everything_has_the_bits_of_one_rank_with_giants(void)
 {
-  for (uint64_t k = 0; k < 6; k++) look(GIANTS + (rt_size() > 8 ? 3 * k : k), k % 2 == 0);
+  for (uint64_t k = 0; k < 6; k++) look(GIANTS + (rt_size() > 8 ? 3 * k : k), k % 2 == 0, 0);
+}
+/* Builds only: moves overlay all at once. Down to a cell or two in a round. */
+static void everything_has_the_bits_of_one_round_in_many_rounds(void)
+{
+  for (uint64_t seed = 2; seed <= num_seeds() + 2; seed += 2) look(seed, true, seed % 4 ? 300 : 20);
+  for (uint64_t k = 0; k < 6; k += 2) look(GIANTS + k, true, 40);
 }
 
 RT_MAIN(RT_CASE(everything_has_the_bits_of_one_rank_with_giants), RT_CASE(everything_has_the_bits_of_one_rank_with_ids),
-        RT_CASE(everything_has_the_bits_of_one_rank_without_ids))
+        RT_CASE(everything_has_the_bits_of_one_rank_without_ids), RT_CASE(everything_has_the_bits_of_one_round_in_many_rounds))

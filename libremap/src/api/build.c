@@ -15,6 +15,9 @@ static remap_status stage(remap_context *ctx, remap_status mine, rm_reason *reas
   return rm_comm_agree_reason(&ctx->comm, mine, reason);
 }
 
+/* Do pairs have second moments? */
+static bool has_second(const remap_context *ctx) { return ctx->options.max_order > 2 || ctx->options.systems; }
+
 /* The largest coordinate of each mesh over all ranks. */
 static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
 {
@@ -26,38 +29,111 @@ static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
   return rm_comm_max_f64(&ctx->comm, magnitude, 2);
 }
 
-/* Crossings, segments and the pairs they make, which stay in arena; the overlay itself ends here. Not collective. */
-static remap_status overlay_pairs(remap_context *ctx, rm_arena *arena, int64_t *crossings, const rm_moments **moments,
-                                  rm_reason *reason)
+/* One of several rounds, of which progress is told as of one. */
+typedef struct turn {
+  remap_context *ctx;
+  int            round, num_rounds;
+} turn;
+
+static remap_status tell(const turn *t, const char *phase, double done)
 {
-  const rm_progress progress = {ctx->options.progress, ctx->options.user};
-  const rm_part    *part     = &ctx->place.part;
-  rm_arena         *own      = rm_arena_new();
-  const rm_overlay *overlay;
-  remap_status      status = own ? REMAP_OK : REMAP_NO_MEMORY;
+  return rm_context_progress(t->ctx, phase, (t->round + done) / t->num_rounds);
+}
+
+static int tell_of_overlay(void *user, const char *phase, double done) { return tell(user, phase, done) != REMAP_OK; }
+
+/* Crossings, segments and the pairs they make, which stay in arena; the overlay itself ends here. Not collective. */
+static remap_status overlay_pairs(turn *t, rm_arena *arena, int64_t *crossings, const rm_moments **moments, rm_reason *reason)
+{
+  const remap_context *ctx      = t->ctx;
+  const rm_progress    progress = {tell_of_overlay, t};
+  const rm_part       *part     = &ctx->place.part;
+  rm_arena            *own      = rm_arena_new();
+  const rm_overlay    *overlay;
+  remap_status         status = own ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = rm_overlay_build(own, ctx->place.trimesh, part, &progress, &overlay, reason);
-  if (status == REMAP_OK)
-    status = rm_moments_build(arena, part, overlay, ctx->options.max_order > 2 || ctx->options.systems ? 2 : 1, moments);
-  if (status == REMAP_OK) *crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
+  if (status == REMAP_OK) status = rm_moments_build(arena, part, overlay, has_second(ctx) ? 2 : 1, moments);
+  if (status == REMAP_OK) *crossings += overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
   rm_arena_drop(own);
   return status;
 }
 
-/* What happens on this rank alone. keeps: the next overlay may use the triangles. */
-static remap_status overlay_here(remap_context *ctx, bool keeps, rm_arena *arena, const double magnitude[2], int64_t *crossings,
-                                 const rm_moments **moments, rm_zone_overlap zones[2], rm_reason *reason)
+/* What happens on this rank alone in a round. keeps: the next overlay may use the triangles. */
+static remap_status overlay_here(turn *t, bool keeps, rm_arena *arena, int64_t *crossings, const rm_moments **moments,
+                                 rm_reason *reason)
 {
-  for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_context_triangulate(ctx, side));
-    RM_TRY(rm_zone_overlap_find(&ctx->frame, &ctx->place.part.piece[side], ctx->place.trimesh[side], ctx->options.faces,
-                                ctx->labels[side].num_zones, ctx->labels[side].zone_cell_offset, magnitude[side], &zones[side],
-                                reason));
-  }
-  RM_TRY(rm_context_progress(ctx, "triangulation", 1));
-  RM_TRY(overlay_pairs(ctx, arena, crossings, moments, reason));
-  for (int side = 0; side < 2 && !keeps; side++) rm_context_drop_triangles(ctx, side);
-  return rm_context_progress(ctx, "volumes and moments", 1);
+  if (!arena) return REMAP_NO_MEMORY;
+  for (int side = 0; side < 2; side++) RM_TRY(rm_context_triangulate(t->ctx, side));
+  RM_TRY(tell(t, "triangulation", 1));
+  RM_TRY(overlay_pairs(t, arena, crossings, moments, reason));
+  for (int side = 0; side < 2 && !keeps; side++) rm_context_drop_triangles(t->ctx, side);
+  return tell(t, "volumes and moments", 1);
+}
+
+/* A round: its cells brought together, overlaid, and the pairs sent home. *seconds grows by what the first takes.
+ * Collective. */
+static remap_status overlay_round(turn *t, bool keeps, rm_gathering *gathering, int64_t *crossings, double *seconds,
+                                  rm_reason *reason)
+{
+  remap_context    *ctx     = t->ctx;
+  const double      start   = rm_seconds();
+  const rm_moments *moments = NULL;
+  rm_arena         *arena;
+  remap_status      status;
+
+  RM_TRY(rm_context_place_round(ctx, t->round, reason));
+  *seconds += rm_seconds() - start;
+  arena = rm_arena_new();
+  RM_GOTO(done, status = stage(ctx, overlay_here(t, keeps, arena, crossings, &moments, reason), reason));
+  status = rm_mapping_add(gathering, &ctx->comm, &ctx->place.part, moments, reason);
+done:
+  rm_arena_drop(arena);
+  return status;
+}
+
+/* All rounds, and the mapping of the pairs that they make. *seconds is what it takes to bring cells together. Collective. */
+static remap_status overlay_all(remap_context *ctx, bool keeps, int64_t *crossings, double *seconds, rm_reason *reason)
+{
+  rm_gathering *gathering = rm_mapping_open(ctx->mesh, has_second(ctx));
+  turn          t         = {ctx, 0, rm_part_rounds(ctx->place.routes)};
+  remap_status  status    = rm_comm_agree(&ctx->comm, gathering ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+
+  for (; t.round < t.num_rounds && status == REMAP_OK; t.round++)
+    status = overlay_round(&t, keeps, gathering, crossings, seconds, reason);
+  if (!keeps) rm_context_drop_place(ctx);
+  if (status == REMAP_OK) status = rm_mapping_close(ctx->arena, gathering, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->mapping);
+  rm_gathering_drop(gathering);
+  return status;
+}
+
+/* ---- zones -------------------------------------------------------------------------------------------------------- */
+
+/* Do zones of a mesh overlap, among all of its cells that come to this rank? They come together for this if they otherwise do
+ * not. Collective. */
+static remap_status find_zone_overlap(remap_context *ctx, int side, double magnitude, rm_zone_overlap *out, rm_reason *reason)
+{
+  const rm_labels *labels = &ctx->labels[side];
+  const bool       is_one = rm_part_rounds(ctx->place.routes) == 1;
+  rm_piece         all    = ctx->place.part.piece[side];
+  int64_t          zones  = labels->num_zones;
+  rm_arena        *arena;
+  remap_status     status;
+
+  *out = (rm_zone_overlap){0, {-1, -1}};
+  RM_TRY(rm_comm_max_i64(&ctx->comm, &zones, 1)); /* a rank without cells need not say */
+  if (zones < 2) return REMAP_OK;
+  arena = rm_arena_new();
+  RM_GOTO(done, status = stage(ctx, arena ? REMAP_OK : REMAP_NO_MEMORY, reason));
+  if (!is_one)
+    RM_GOTO(done, status = rm_part_send(arena, &ctx->comm, ctx->mesh[side], ctx->place.routes, RM_EVERY_ROUND, &all, reason));
+  status = stage(ctx,
+                 rm_zone_overlap_find(&ctx->frame, &all, ctx->options.faces, labels->num_zones, labels->zone_cell_offset,
+                                      magnitude, out, reason),
+                 reason);
+done:
+  rm_arena_drop(arena);
+  return status;
 }
 
 /* The largest overlap of two zones over all ranks. */
@@ -123,22 +199,22 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
 /* The overlay of meshes that move or are new, which are read again, and of others, which are as they were. Collective. */
 static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, rm_arena *passing, rm_reason *reason)
 {
-  int64_t           crossings = 0;
-  const rm_moments *moments = NULL;
-  rm_zone_overlap   zones[2];
-  bool              is_new[2] = {moves[0], moves[1]};
-  double            start = rm_seconds(), magnitude[2];
+  int64_t         crossings = 0;
+  rm_zone_overlap zones[2];
+  bool            is_new[2] = {moves[0], moves[1]};
+  const double    start = rm_seconds();
+  double          seconds, magnitude[2];
 
   RM_TRY(rm_context_read_meshes(ctx, is_new, passing, reason));
-  RM_TRY(rm_context_place(ctx, is_new, passing, reason));
+  RM_TRY(rm_context_place(ctx, is_new, keeps, passing, reason));
   RM_TRY(find_magnitudes(ctx, magnitude));
-  ctx->stats.seconds_partition = rm_seconds() - start;
-  start                        = rm_seconds();
-  RM_TRY(stage(ctx, overlay_here(ctx, keeps, passing, magnitude, &crossings, &moments, zones, reason), reason));
+  seconds = rm_seconds() - start;
+  for (int side = 0; side < 2; side++) RM_TRY(find_zone_overlap(ctx, side, magnitude[side], &zones[side], reason));
   RM_TRY(worst_zone_overlap(ctx, zones, reason));
-  RM_TRY(rm_mapping_build(ctx->arena, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->place.part, moments, &ctx->mapping, reason));
+  RM_TRY(overlay_all(ctx, keeps, &crossings, &seconds, reason));
   RM_TRY(rm_context_compare_volumes(ctx));
-  ctx->stats.seconds_overlay = rm_seconds() - start;
+  ctx->stats.seconds_partition = seconds;
+  ctx->stats.seconds_overlay   = rm_seconds() - start - seconds;
   return fill_stats(ctx, crossings);
 }
 

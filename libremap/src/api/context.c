@@ -57,6 +57,7 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
   }
   remap_options_default(ctx ? &ctx->options : NULL);
   if (ctx && options) ctx->options = *options;
+  if (ctx) ctx->slicing = (rm_slicing){RM_ROUND_TRIANGLES, RM_ROUND_REPEATS};
   if (status == REMAP_OK && !options_are_good(&ctx->options)) status = REMAP_BAD_ARGUMENT;
   if (status == REMAP_OK && !rm_geom_selftest()) status = REMAP_INTERNAL;
   const remap_status duplicated = rm_comm_dup(comm, &own);

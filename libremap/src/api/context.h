@@ -28,6 +28,11 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
+/* What is overlaid at once at most: about 16,000 hexahedra of either mesh, for which the overlay takes 40 MB with diagonal
+ * faces, 90 MB with centres. */
+enum { RM_ROUND_TRIANGLES = 400000 };
+#define RM_ROUND_REPEATS 0.5
+
 /* Calls that all ranks make together, or among neighbours. */
 typedef enum rm_call {
   RM_CALL_BUILD = 1, RM_CALL_MOVE, RM_CALL_MASKS, RM_CALL_AGREE, RM_CALL_PARTIAL_CELLS, RM_CALL_SUPERMESH,
@@ -39,6 +44,7 @@ struct remap_context {
   rm_arena     *peers_arena;
   rm_parley     few, parley; /* that calls begin with; few: of ranks in the tree only, parley: of neighbours too */
   remap_options options;
+  rm_slicing    slicing;  /* of overlays that keep nothing for the next one */
   remap_mesh   *block[2]; /* [side][num_blocks] as lent; malloc'ed */
   int64_t       block_room[2];
   int           num_blocks[2];
@@ -119,9 +125,13 @@ remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side
  * all. Collective. What is not kept lives in passing. */
 remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena *passing, rm_reason *reason);
 
-/* Bring the cells of both meshes to where they are overlaid, unless they are there already: is_new[side], the mesh is not as it
- * was at the last call. Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
-remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena *passing, rm_reason *reason);
+/* Choose where the cells of both meshes are overlaid, in how many rounds (rm_part_rounds), one if the place is to be kept; if
+ * it is one, bring them there, unless they are there already: is_new[side], the mesh is not as it was at the last call.
+ * Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_arena *passing, rm_reason *reason);
+
+/* Bring the cells of a round there, if there are several, in place of those of the last. Collective. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_place_round(remap_context *ctx, int round, rm_reason *reason);
 
 /* Triangulate what is there of one side, unless that is done already. Not collective. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_triangulate(remap_context *ctx, int side);
@@ -131,6 +141,10 @@ void rm_context_drop_triangles(remap_context *ctx, int side);
 
 /* Forget where cells are overlaid. Not collective. */
 void rm_context_drop_place(remap_context *ctx);
+
+/* Volumes and moments of source cells' pairs too, which remap_build leaves to those who look at them. Not collective.
+ * NO_MEMORY. */
+remap_status rm_context_need_pairs(remap_context *ctx);
 
 /* Compare the solver's volumes of one side, which lie as given, with those of its mesh. Collective. BAD_MESH. */
 remap_status rm_context_measure(remap_context *ctx, int side, const remap_mesh *given, rm_reason *reason);

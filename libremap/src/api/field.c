@@ -184,16 +184,26 @@ static remap_status need_wide(remap_context *ctx, remap_side side, bool is_givin
                           ctx->second[side], *stencil_of(ctx, side, is_giving), wide);
 }
 
+/* Does a transfer look at what pairs of source cells hold? Forward for integrals over those that are covered in part, and for
+ * systems. */
+static bool needs_pairs(const remap_context *ctx, remap_direction direction)
+{
+  return direction == REMAP_BACKWARD || ctx->options.systems || ctx->options.max_order > 2 ||
+         ctx->masked[direction]->cells_by_cover[REMAP_SOURCE][REMAP_PARTIAL] > 0;
+}
+
 /* Make the carrier that a load needs, and what it rests on. Collective. */
 static remap_status prepare(remap_context *ctx, remap_direction direction, rm_load load, rm_reason *reason)
 {
   const remap_side giving = giver_of(direction);
+  remap_status     mine   = needs_pairs(ctx, direction) ? rm_context_need_pairs(ctx) : REMAP_OK;
 
   if (ctx->carrier[direction]) load = rm_load_max(load, ctx->load[direction]);
   rm_arena_drop(ctx->carrier_arena[direction]);
   ctx->carrier[direction]       = NULL;
   ctx->carrier_arena[direction] = rm_arena_new();
-  RM_TRY(rm_comm_agree(&ctx->comm, ctx->carrier_arena[direction] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  if (!ctx->carrier_arena[direction]) mine = REMAP_NO_MEMORY;
+  RM_TRY(rm_comm_agree(&ctx->comm, mine, NULL));
   if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
   if (load.has_nearest || load.is_blended) RM_TRY(need_stencil(ctx, 1 - giving, false));
   if (load.is_wide || load.is_curved) RM_TRY(need_second(ctx));

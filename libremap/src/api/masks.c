@@ -87,7 +87,7 @@ static remap_status apply(remap_context *ctx, const remap_masks *masks, rm_reaso
   RM_TRY(rm_comm_max_i64(&ctx->comm, any, 4));
   if (!any[0] && !any[1] && !any[2] && !any[3] && !(least[0] > 0.0) && !(least[1] > 0.0)) return REMAP_OK;
   ctx->mask_arena = rm_arena_new();
-  if (!ctx->mask_arena) status = REMAP_NO_MEMORY;
+  status          = ctx->mask_arena ? rm_context_need_pairs(ctx) : REMAP_NO_MEMORY;
   for (int side = 0; side < 2; side++) {
     const rm_lid n = ctx->mesh[side]->num_cells;
 

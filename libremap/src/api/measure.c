@@ -98,10 +98,10 @@ static remap_status compare_side(remap_context *ctx, rm_arena *scratch, int side
   RM_ASSERT(have);
   RM_TRY(rm_comm_agree(&ctx->comm, rm_plan_run(&ctx->comm, rows->plan, sizeof *heard, volume[1 - side], heard, buffer), NULL));
   for (rm_lid c = 0; c < rows->num_cells; c++) {
-    const int64_t k = rows->offset[c];
+    if (!rows->same[c]) continue;
+    const double other = heard[rows->giver[rows->offset[c]]];
 
-    if (rm_is_mapped(rows->cover[c]) && rows->same[k])
-      differs[c] = volume[side][c] < heard[rows->giver[k]] || volume[side][c] > heard[rows->giver[k]];
+    differs[c] = volume[side][c] < other || volume[side][c] > other;
   }
   ctx->differs[side] = differs;
   return REMAP_OK;

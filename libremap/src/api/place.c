@@ -9,6 +9,8 @@
  * reduction tells. More source cells than are needed change no result. The margin follows the pace of the motion and is 0 for a
  * build, or where cells move by much of their size at once.
  *
+ * A build keeps nothing, and may overlay a rank's cells in rounds, piece by piece; moves overlay them in one.
+ *
  * O(n) time for what is made anew, besides two numbers per cell that moved; kept are 48 bytes per cell, and pieces and
  * triangles. */
 #include "api/context.h"
@@ -91,7 +93,7 @@ static remap_status open_place(remap_context *ctx, double margin, rm_arena *pass
 }
 
 /* Choose routes. Collective. */
-static remap_status choose_routes(remap_context *ctx, double margin, rm_arena *passing, rm_reason *reason)
+static remap_status choose_routes(remap_context *ctx, double margin, bool keeps, rm_arena *passing, rm_reason *reason)
 {
   rm_mesh        widened;
   const rm_mesh *mesh[2] = {ctx->mesh[REMAP_SOURCE], &widened};
@@ -100,7 +102,8 @@ static remap_status choose_routes(remap_context *ctx, double margin, rm_arena *p
   rm_context_drop_place(ctx);
   RM_TRY(rm_comm_agree(&ctx->comm, open_place(ctx, margin, passing, &widened), NULL));
   RM_TRY(rm_zone_build(passing, &ctx->comm, mesh, &zone));
-  RM_TRY(rm_part_plan(ctx->place.arena, &ctx->comm, &ctx->frame, mesh, zone, &ctx->place.routes, reason));
+  RM_TRY(rm_part_plan(ctx->place.arena, &ctx->comm, &ctx->frame, mesh, zone, keeps ? &rm_one_block : &ctx->slicing,
+                      &ctx->place.routes, reason));
   ctx->place.frame = ctx->frame;
   return REMAP_OK;
 }
@@ -121,8 +124,8 @@ static remap_status try_routes(remap_context *ctx, bool *hold, double *margin)
   return REMAP_OK;
 }
 
-/* A mesh's cells along the routes. Collective. */
-static remap_status send_piece(remap_context *ctx, int side, rm_reason *reason)
+/* A mesh's cells along the routes of a round. Collective. */
+static remap_status send_piece(remap_context *ctx, int side, int round, rm_reason *reason)
 {
   rm_place *place = &ctx->place;
 
@@ -130,22 +133,31 @@ static remap_status send_piece(remap_context *ctx, int side, rm_reason *reason)
   place->piece_arena[side] = rm_arena_new();
   rm_context_drop_triangles(ctx, side);
   RM_TRY(rm_comm_agree(&ctx->comm, place->piece_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  return rm_part_send(place->piece_arena[side], &ctx->comm, ctx->mesh[side], place->routes, &place->part.piece[side], reason);
+  return rm_part_send(place->piece_arena[side], &ctx->comm, ctx->mesh[side], place->routes, round, &place->part.piece[side],
+                      reason);
 }
 
-remap_status rm_context_place(remap_context *ctx, const bool is_new[2], rm_arena *passing, rm_reason *reason)
+remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_arena *passing, rm_reason *reason)
 {
   bool   hold;
   double margin;
 
   RM_TRY(try_routes(ctx, &hold, &margin));
-  if (!hold) RM_TRY(choose_routes(ctx, margin, passing, reason));
+  if (!hold) RM_TRY(choose_routes(ctx, margin, keeps, passing, reason));
   if (hold && memcmp(&ctx->place.frame, &ctx->frame, sizeof ctx->frame)) { /* triangles are in order along its curve */
     ctx->place.frame = ctx->frame;
     for (int side = 0; side < 2; side++) rm_context_drop_triangles(ctx, side);
   }
   for (int side = 0; side < 2; side++)
-    if (!hold || is_new[side]) RM_TRY(send_piece(ctx, side, reason));
+    if ((!hold || is_new[side]) && rm_part_rounds(ctx->place.routes) == 1) RM_TRY(send_piece(ctx, side, 0, reason));
+  RM_ASSERT(rm_part_rounds(ctx->place.routes) > 1 || rm_part_check(&ctx->place.part) != REMAP_INTERNAL);
+  return REMAP_OK;
+}
+
+remap_status rm_context_place_round(remap_context *ctx, int round, rm_reason *reason)
+{
+  if (rm_part_rounds(ctx->place.routes) == 1) return REMAP_OK;
+  for (int side = 0; side < 2; side++) RM_TRY(send_piece(ctx, side, round, reason));
   RM_ASSERT(rm_part_check(&ctx->place.part) != REMAP_INTERNAL);
   return REMAP_OK;
 }

@@ -10,6 +10,17 @@ static const rm_rows *rows_of(const remap_context *ctx, remap_side side)
   return &ctx->masked[side == REMAP_TARGET ? REMAP_FORWARD : REMAP_BACKWARD]->rows[side];
 }
 
+remap_status rm_context_need_pairs(remap_context *ctx)
+{
+  const rm_mapping *before = ctx->mapping;
+
+  if (before->rows[REMAP_SOURCE].volume) return REMAP_OK;
+  RM_TRY(rm_mapping_complete(ctx->arena, ctx->mesh, before, &ctx->mapping));
+  for (int d = 0; d < 2; d++)
+    if (ctx->masked[d] == before) ctx->masked[d] = ctx->mapping;
+  return REMAP_OK;
+}
+
 static bool is_side(remap_side side) { return side == REMAP_SOURCE || side == REMAP_TARGET; }
 
 remap_status remap_get_stats(remap_context *ctx, remap_stats *out)
@@ -48,6 +59,8 @@ remap_status remap_coverage(remap_context *ctx, remap_side side, double *fractio
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   RM_TRY(rm_context_check_view(ctx, is_side(side), "remap_coverage"));
+  if (side == REMAP_SOURCE && fraction && rm_context_need_pairs(ctx) != REMAP_OK)
+    return rm_context_fail(ctx, REMAP_NO_MEMORY, "remap_coverage: no memory for the pairs of this rank: use more ranks");
   const rm_rows *rows = rows_of(ctx, side);
 
   for (rm_lid c = 0; c < rows->num_cells; c++) {
@@ -137,6 +150,7 @@ remap_status remap_partial_cells(remap_context *ctx, remap_side side, int *num, 
 
   if (status != REMAP_OK) rm_fail(status, &reason, -1, -1, "%s", ctx->message);
   if (!scratch) status = REMAP_NO_MEMORY;
+  if (status == REMAP_OK && side == REMAP_SOURCE) status = rm_context_need_pairs(ctx);
   RM_GOTO(done, status = rm_context_start_call(ctx, RM_CALL_PARTIAL_CELLS, status, &reason));
   RM_GOTO(done, status = rm_comm_max_i64(&ctx->comm, room, 2));
   status = room[0] == -room[1]
@@ -156,11 +170,13 @@ static remap_status copy_pairs(rm_arena *arena, const rm_rows *rows, double unit
   int64_t      *global;
   int          *rank;
   double       *volume, *moment, *second = NULL;
+  uint8_t      *same;
 
   RM_NEW(global, arena, n);
   RM_NEW(rank, arena, n);
   RM_NEW(volume, arena, n);
   RM_NEW(moment, arena, 3 * n);
+  RM_NEW(same, arena, n);
   if (rows->second) RM_NEW(second, arena, 6 * n);
   for (int64_t k = 0; k < n; k++) {
     global[k] = rows->giver_global[rows->giver[k]];
@@ -169,7 +185,9 @@ static remap_status copy_pairs(rm_arena *arena, const rm_rows *rows, double unit
     for (int a = 0; a < 3; a++) moment[3 * k + a] = rows->moment[k][a] * cubed * unit;
     for (int a = 0; a < 6 && second; a++) second[6 * k + a] = rows->second[k][a] * cubed * unit * unit;
   }
-  *out = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, rows->same, second};
+  for (rm_lid c = 0; c < rows->num_cells; c++)
+    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++) same[k] = rows->same[c];
+  *out = (remap_pairs_view){rows->num_cells, rows->offset, global, rank, volume, moment, same, second};
   return REMAP_OK;
 }
 
@@ -177,11 +195,12 @@ remap_status remap_pairs(remap_context *ctx, remap_direction direction, remap_pa
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   RM_TRY(rm_context_check_view(ctx, out && (direction == REMAP_FORWARD || direction == REMAP_BACKWARD), "remap_pairs"));
+  const remap_status complete = direction == REMAP_BACKWARD ? rm_context_need_pairs(ctx) : REMAP_OK;
   const rm_rows    *rows = rows_of(ctx, direction == REMAP_FORWARD ? REMAP_TARGET : REMAP_SOURCE);
   rm_arena         *arena = ctx->mask_arena ? ctx->mask_arena : ctx->arena;
   remap_pairs_view *view = &ctx->view[direction];
 
-  if (!view->row_offset && copy_pairs(arena, rows, 1 / ctx->frame.scale, view) != REMAP_OK)
+  if (complete != REMAP_OK || (!view->row_offset && copy_pairs(arena, rows, 1 / ctx->frame.scale, view) != REMAP_OK))
     return rm_context_fail(ctx, REMAP_NO_MEMORY,
                            "remap_pairs: no memory for copies of the %lld pairs of this rank: use more ranks",
                            (long long)rows->offset[rows->num_cells]);

@@ -120,7 +120,7 @@ static inline bool rm_is_amount(const rm_packing *packing, int f)
 /* Is what a mapped cell has of a field, amounts or not, that of the only cell that it shares volume with, as it is? */
 static inline bool rm_is_copied(const rm_rows *rows, const uint8_t *differs, rm_lid cell, bool is_amount)
 {
-  return rows->same[rows->offset[cell]] && !(is_amount && differs && differs[cell]);
+  return rows->same[cell] && !(is_amount && differs && differs[cell]);
 }
 
 /* Do receiving cells need bounds: all (CAAS, systems), or those in part covered that a reconstruction is taken beyond? */

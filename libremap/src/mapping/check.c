@@ -27,9 +27,10 @@ static bool row_holds(const rm_rows *rows, rm_lid cell, double cell_volume, rm_l
 
     if (g < 0 || g >= rows->num_givers || last_row[g] == cell + 1) return false;
     last_row[g] = cell + 1;
-    if (!rows->same[k]) continue;
-    if (rows->cover[cell] != REMAP_COVERED || end - first != 1 || rows->volume[k] != cell_volume) return false;
-    for (int d = 0; d < 3; d++)
+    if (!rows->same[cell]) continue;
+    if (rows->cover[cell] != REMAP_COVERED || end - first != 1) return false;
+    if (rows->volume && rows->volume[k] != cell_volume) return false;
+    for (int d = 0; d < 3 && rows->moment; d++)
       if (rows->moment[k][d] != 0.0) return false;
   }
   return true;

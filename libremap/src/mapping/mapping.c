@@ -1,49 +1,19 @@
-/* mapping -- from pairs on the ranks that overlaid them to rows on the ranks that own the cells.
+/* mapping -- rows on the ranks that own the cells, out of the pairs that have come to them.
  *
- *   overlay ranks          homes of the receiving cells
- *   (i, j, V, M)  ----->   j | i1 i2 i3 ...       serves source to target
- *        \------------->   i | j1 j2 ...          serves target to source, moments about c_j
- *
- * Each pair travels twice, as one record of 48 bytes, in one exchange per direction; what is to be known of a giving cell goes
- * once from an overlay rank to a home, in another of as many bytes per cell; second moments, where there are any, in a third.
  * A row is put into the canonical order of its givers, so nothing that is summed along it can depend on where the pairs were
- * made. O(p) time and memory for p pairs. */
-#include "mapping.h"
+ * made. The rows of the source cells say which pair of a target cell is theirs; what that holds is turned round when it is
+ * asked for. O(p) time for p pairs; besides the pairs, 20 bytes each are needed on the way, and 100 per giver. */
+#include "mapping_private.h"
 
+#include <stdlib.h>
 #include <string.h>
-
-/* A pair on its way to the home of its receiving cell. */
-typedef struct pair_record {
-  double  volume, moment[3]; /* about the giver's centroid                                                             */
-  rm_lid  receiver;          /* its number at home                                                                     */
-  rm_lid  giver;             /* place in the sender's list for that home; -1: without volume, no pair, but its skin counts */
-  int32_t is_cut;            /* not 0: the skin of the giving mesh passes through the receiver                         */
-  int32_t unused;            /* no padding on the wire                                                                 */
-} pair_record;
-
-/* A giving cell on its way to the home of cells that it gives to. */
-typedef struct giver_record {
-  double  centroid[3], volume;
-  rm_gid  global;
-  rm_lid  cell; /* its number at its own home */
-  int32_t rank; /* that home                  */
-} giver_record;
-
-/* What goes out to, or came from, each rank in turn. */
-typedef struct shipment {
-  int64_t      *pair_offset, *giver_offset; /* [comm->size + 1]                                          */
-  pair_record  *pair;                       /* [pair_offset[comm->size]]                                 */
-  giver_record *giver;                      /* [giver_offset[comm->size]]                                */
-  double      (*second)[6];                 /* of each pair, about the giver's centroid; NULL: none      */
-} shipment;
 
 /* A side's rows while they are filled: the arrays of rm_rows, writable. */
 typedef struct rows_draft {
   int64_t *offset;
-  rm_lid  *giver;
-  double  *volume;
-  double (*moment)[3], (*second)[6]; /* second NULL if there are none */
   uint8_t *same, *cover;
+  double  *volume;     /* source side: in passing */
+  double (*moment)[3]; /* NULL of the source side */
   double (*centroid_error)[3];
   int    *giver_rank;
   rm_lid *giver_cell;
@@ -51,218 +21,165 @@ typedef struct rows_draft {
   double (*giver_centroid)[3];
 } rows_draft;
 
-/* Both sides of the pairs of a part, one of which receives. */
-typedef struct giving {
-  const rm_piece *to, *from;
-  const rm_lid   *receiver, *giver;   /* [pairs] cells of these                                */
-  int             skin;               /* flag of a pair through whose receiver the skin passes */
-  const double  (*second)[6];         /* [pairs] NULL: none                                    */
-  bool            backward;
-} giving;
+/* One call of rm_mapping_close. */
+typedef struct job {
+  rm_arena             *arena, *passing; /* passing: until rows of both sides are there */
+  const rm_comm        *comm;
+  const rm_frame       *frame;
+  const rm_mesh *const *mesh;
+  rm_mapping           *mapping;
+  rows_draft            draft[2];
+  rm_lid               *place_of; /* [pairs of the target cells] where in the rows each is that arrived */
+} job;
 
-static giving giving_to(remap_side receiving, const rm_part *part, const rm_moments *moments)
-{
-  if (receiving == REMAP_TARGET)
-    return (giving){&part->piece[1], &part->piece[0], moments->target, moments->source, RM_PAIR_SOURCE_SKIN, moments->second,
-                    false};
-  return (giving){&part->piece[0], &part->piece[1], moments->source, moments->target, RM_PAIR_TARGET_SKIN, moments->second_back,
-                  true};
-}
-
-/* List the pairs by the home of the receiving cell, their order kept: pair_offset, and place [pairs] of each record. */
-static remap_status sort_by_home(rm_arena *scratch, const rm_comm *comm, const giving *g, int64_t n, int64_t *pair_offset,
-                                 int64_t **place)
-{
-  int64_t *next;
-
-  RM_NEW(*place, scratch, n);
-  RM_NEW(next, scratch, (int64_t)comm->size + 1);
-  for (int r = 0; r <= comm->size; r++) pair_offset[r] = 0;
-  for (int64_t k = 0; k < n; k++) pair_offset[g->to->cell_home_rank[g->receiver[k]]]++;
-  rm_offsets(pair_offset, comm->size);
-  for (int r = 0; r < comm->size; r++) next[r] = pair_offset[r];
-  for (int64_t k = 0; k < n; k++) (*place)[next[g->to->cell_home_rank[g->receiver[k]]]++] = k;
-  return REMAP_OK;
-}
-
-/* The pair's record but for its giver. */
-static pair_record record_of(const giving *g, const rm_moments *moments, int64_t k)
-{
-  const rm_lid  i = g->giver[k], j = g->receiver[k];
-  const double *c = g->from->cell_centroid[i];
-  pair_record   p = {.volume   = moments->volume[k],
-                     .receiver = g->to->cell_home[j],
-                     .giver    = -1,
-                     .is_cut   = (moments->flags[k] & g->skin) != 0};
-
-  for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
-    p.moment[d] = moments->moment[k][d] + (g->backward ? (g->to->cell_centroid[j][d] - c[d]) * p.volume : 0.0);
-  return p;
-}
-
-/* The pairs of a part as they leave, and for each home the cells that give there, once. */
-static remap_status pack_pairs(rm_arena *scratch, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                               remap_side receiving, shipment *out)
-{
-  const giving    g = giving_to(receiving, part, moments);
-  const rm_piece *from = g.from;
-  const int64_t   n    = moments->num_pairs;
-  int64_t        *order, *place, num = 0; /* place of a cell among the givers so far, -1 */
-  rm_lid         *cell;
-
-  RM_TRY(sort_by_home(scratch, comm, &g, n, out->pair_offset, &order));
-  RM_NEW(out->pair, scratch, n);
-  if (g.second) RM_NEW(out->second, scratch, n);
-  RM_NEW(cell, scratch, n);
-  RM_NEW(place, scratch, from->num_cells);
-  for (rm_lid c = 0; c < from->num_cells; c++) place[c] = -1;
-  for (int r = 0; r < comm->size; r++) {
-    out->giver_offset[r] = num;
-    for (int64_t at = out->pair_offset[r]; at < out->pair_offset[r + 1]; at++) {
-      const int64_t k = order[at];
-      int64_t      *seen = &place[g.giver[k]];
-
-      out->pair[at] = record_of(&g, moments, k);
-      for (int d = 0; d < 6 && g.second; d++) out->second[at][d] = g.second[k][d];
-      if (moments->flags[k] & RM_PAIR_EMPTY) continue;
-      if (*seen < out->giver_offset[r]) cell[*seen = num++] = g.giver[k];
-      out->pair[at].giver = (rm_lid)(*seen - out->giver_offset[r]);
-    }
-  }
-  out->giver_offset[comm->size] = num;
-  RM_NEW(out->giver, scratch, num);
-  for (int64_t k = 0; k < num; k++) {
-    const double *c = from->cell_centroid[cell[k]];
-
-    out->giver[k] = (giver_record){{c[0], c[1], c[2]},           from->cell_volume[cell[k]],    from->cell_global[cell[k]],
-                                   from->cell_home[cell[k]], from->cell_home_rank[cell[k]]};
-  }
-  return REMAP_OK;
-}
-
-static remap_status new_offsets(rm_arena *arena, const rm_comm *comm, shipment *out)
-{
-  if (!arena) return REMAP_NO_MEMORY;
-  RM_NEW(out->pair_offset, arena, (int64_t)comm->size + 1);
-  RM_NEW(out->giver_offset, arena, (int64_t)comm->size + 1);
-  return REMAP_OK;
-}
-
-/* Send it all. Collective. What arrives lives in arena. */
-static remap_status ship(rm_arena *arena, const rm_comm *comm, const shipment *out, bool has_second, shipment *in)
-{
-  void *recv;
-
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->pair, out->pair_offset, out->pair, in->pair_offset, &recv));
-  in->pair = recv;
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->giver, out->giver_offset, out->giver, in->giver_offset, &recv));
-  in->giver = recv;
-  if (!has_second) return REMAP_OK;
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *out->second, out->pair_offset, out->second, in->pair_offset, &recv));
-  in->second = recv;
-  return REMAP_OK;
-}
-
-static remap_status new_rows(rm_arena *arena, int64_t num_cells, int64_t num_pairs, bool has_second, rows_draft *draft)
+static remap_status new_rows(rm_arena *arena, int64_t num_cells, rows_draft *draft)
 {
   RM_NEW0(draft->offset, arena, num_cells + 1);
   RM_NEW0(draft->cover, arena, num_cells);
+  RM_NEW0(draft->same, arena, num_cells);
   RM_NEW0(draft->centroid_error, arena, num_cells);
-  RM_NEW(draft->giver, arena, num_pairs);
-  RM_NEW(draft->volume, arena, num_pairs);
-  RM_NEW(draft->moment, arena, num_pairs);
-  draft->second = NULL;
-  if (has_second) RM_NEW(draft->second, arena, num_pairs);
-  RM_NEW0(draft->same, arena, num_pairs);
   return REMAP_OK;
 }
 
-/* Put the givers that came, of which several senders may have sent the same, into the rows' list, each once, and the pairs'
- * numbers for them into that list's. */
-static remap_status list_givers(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, shipment *in, rows_draft *draft,
-                                rm_rows *rows, double **volume)
+/* The givers by rank and number there; pairs say which by their places in that list. */
+static remap_status sort_givers(rm_arena *arena, rm_arrivals *a, rows_draft *draft, rm_rows *rows)
 {
-  const int64_t n = in->giver_offset[comm->size];
-  int64_t       num = 0;
-  rm_keyed     *keyed, *spare;
-  rm_lid       *number;
+  const int64_t num     = a->num_givers;
+  rm_arena     *scratch = rm_arena_new();
+  rm_keyed     *keyed   = scratch ? rm_arena_alloc(scratch, 2 * num, sizeof *keyed) : NULL;
+  rm_lid       *number  = scratch ? rm_arena_alloc(scratch, num, sizeof *number) : NULL; /* where each is then */
+  const bool    have    = keyed && number;
 
-  RM_NEW(keyed, scratch, n);
-  RM_NEW(spare, scratch, n);
-  RM_NEW(number, scratch, n);
-  for (int64_t k = 0; k < n; k++)
-    keyed[k] = (rm_keyed){(uint64_t)in->giver[k].rank << 32 | (uint64_t)in->giver[k].cell, k};
-  rm_sort_keyed(keyed, spare, n);
-  for (int64_t k = 0; k < n; k++) {
-    num += k == 0 || keyed[k].key != keyed[k - 1].key;
-    number[keyed[k].item] = (rm_lid)(num - 1);
+  for (int64_t g = 0; g < num && have; g++)
+    keyed[g] = (rm_keyed){(uint64_t)a->giver_rank[g] << 32 | (uint64_t)a->giver_cell[g], g};
+  if (have) rm_sort_keyed(keyed, keyed + num, num);
+  draft->giver_rank     = rm_arena_alloc(arena, num, sizeof *draft->giver_rank);
+  draft->giver_cell     = rm_arena_alloc(arena, num, sizeof *draft->giver_cell);
+  draft->giver_global   = rm_arena_alloc(arena, num, sizeof *draft->giver_global);
+  draft->giver_centroid = rm_arena_alloc(arena, num, sizeof *draft->giver_centroid);
+  rows->num_givers      = (rm_lid)num;
+  const bool done = have && draft->giver_rank && draft->giver_cell && draft->giver_global && draft->giver_centroid;
+  for (int64_t g = 0; g < num && done; g++) {
+    draft->giver_rank[g]   = (int)(keyed[g].key >> 32);
+    draft->giver_cell[g]   = (rm_lid)(keyed[g].key & INT32_MAX);
+    number[keyed[g].item]  = (rm_lid)g;
   }
-  rows->num_givers = (rm_lid)num;
-  RM_NEW(draft->giver_rank, arena, num);
-  RM_NEW(draft->giver_cell, arena, num);
-  RM_NEW(draft->giver_global, arena, num);
-  RM_NEW(draft->giver_centroid, arena, num);
-  RM_NEW(*volume, scratch, num);
-  for (int64_t k = 0; k < n; k++) {
-    const giver_record *from = &in->giver[k];
-    const rm_lid        g    = number[k];
-
-    draft->giver_rank[g]   = from->rank;
-    draft->giver_cell[g]   = from->cell;
-    draft->giver_global[g] = from->global;
-    (*volume)[g]           = from->volume;
-    for (int d = 0; d < 3; d++) draft->giver_centroid[g][d] = from->centroid[d];
-  }
-  for (int r = 0; r < comm->size; r++)
-    for (int64_t k = in->pair_offset[r]; k < in->pair_offset[r + 1]; k++)
-      if (in->pair[k].giver >= 0) in->pair[k].giver = number[in->giver_offset[r] + in->pair[k].giver];
-  return REMAP_OK;
+  for (int64_t k = 0; k < a->num && done; k++) a->giver[k] = number[a->giver[k]];
+  rm_arena_drop(scratch);
+  rm_arrivals_forget_givers(a);
+  return done ? REMAP_OK : REMAP_NO_MEMORY;
 }
 
-/* Records sorted by receiver and, within, by the canonical order of the givers, whose volumes are given: place [n] lists them
- * so. Both by counting. */
-static remap_status sort_rows(rm_arena *scratch, const rm_frame *frame, int64_t n, const pair_record *record,
-                              const double *volume, const rows_draft *draft, const rm_rows *rows, rm_lid *place)
+/* What rows need to know of their givers, from the homes; volume [num_givers]. Collective. */
+static remap_status fetch_givers(rm_arena *scratch, const rm_comm *comm, const rm_mesh *givers, const rm_rows *rows,
+                                 rows_draft *draft, double **volume)
+{
+  const rm_plan *plan   = rows->plan;
+  void          *buffer = rm_arena_alloc(scratch, plan->send_offset[plan->num_send], sizeof *draft->giver_centroid);
+
+  *volume = rm_arena_alloc(scratch, rows->num_givers, sizeof **volume);
+  RM_TRY(rm_comm_agree(comm, buffer && *volume ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_TRY(rm_plan_run(comm, plan, sizeof *draft->giver_centroid, givers->cell_centroid, draft->giver_centroid, buffer));
+  RM_TRY(rm_plan_run(comm, plan, sizeof **volume, givers->cell_volume, *volume, buffer));
+  return rm_plan_run(comm, plan, sizeof *draft->giver_global, givers->cell_global, draft->giver_global, buffer);
+}
+
+/* Put the places of a row's pairs, n of them, into the order of their givers. word is [n]. */
+static void sort_row(const rm_lid *giver, const rm_lid *rank_of_giver, uint64_t *word, rm_lid *place, int64_t n)
+{
+  for (int64_t k = 0; k < n; k++) word[k] = (uint64_t)rank_of_giver[giver[place[k]]] << 32 | (uint64_t)place[k];
+  rm_sort_words(word, n);
+  for (int64_t k = 0; k < n; k++) place[k] = (rm_lid)(word[k] & INT32_MAX);
+}
+
+/* Which pair stands where in the rows: place [pairs]; and the rows' offsets. volume [num_givers]. */
+static remap_status order_pairs(rm_arena *scratch, const job *j, const rm_arrivals *a, const rm_rows *rows, rows_draft *draft,
+                                const double *volume, rm_lid *place)
 {
   const rm_lid num = rows->num_givers;
-  rm_lid      *order, *by_giver;
-  int64_t     *end, *next, at = 0;
+  int64_t     *next, longest = 0;
+  uint64_t    *word;
+  rm_lid      *order, *rank_of_giver;
 
   RM_NEW(order, scratch, num);
-  RM_NEW(by_giver, scratch, n);
-  RM_NEW0(end, scratch, num);
+  RM_NEW(rank_of_giver, scratch, num);
   RM_NEW(next, scratch, rows->num_cells);
-  RM_TRY(
-      rm_canonical_order(scratch, frame, num, (const double(*)[3])draft->giver_centroid, volume, draft->giver_global, order));
-  for (int64_t k = 0; k < n; k++) end[record[k].giver]++;
-  for (rm_lid k = 0; k < num; k++) {
-    const int64_t count = end[order[k]];
-
-    end[order[k]] = at;
-    at += count;
+  RM_TRY(rm_canonical_order(scratch, j->frame, num, (const double(*)[3])draft->giver_centroid, volume, draft->giver_global,
+                            order));
+  for (rm_lid k = 0; k < num; k++) rank_of_giver[order[k]] = k;
+  for (int64_t k = 0; k < a->num; k++) {
+    RM_ASSERT(a->receiver[k] >= 0 && a->receiver[k] < rows->num_cells);
+    draft->offset[a->receiver[k]]++;
   }
-  for (int64_t k = 0; k < n; k++) by_giver[end[record[k].giver]++] = (rm_lid)k;
+  for (rm_lid c = 0; c < rows->num_cells; c++) longest = draft->offset[c] > longest ? draft->offset[c] : longest;
+  rm_offsets(draft->offset, rows->num_cells);
+  RM_NEW(word, scratch, longest);
   for (rm_lid c = 0; c < rows->num_cells; c++) next[c] = draft->offset[c];
-  for (int64_t k = 0; k < n; k++) place[next[record[by_giver[k]].receiver]++] = by_giver[k];
+  for (int64_t k = 0; k < a->num; k++) place[next[a->receiver[k]]++] = (rm_lid)k;
+  for (rm_lid c = 0; c < rows->num_cells; c++)
+    sort_row(a->giver, rank_of_giver, word, place + draft->offset[c], draft->offset[c + 1] - draft->offset[c]);
   return REMAP_OK;
 }
 
-/* Mark the cells that a skin passes through, and take the records out that are no pairs, with their second moments. Returns how
- * many stay. */
-static int64_t mark_cut(int64_t n, pair_record *record, double (*second)[6], uint8_t *is_cut)
+/* The same, in memory that ends here, and then the pairs in that order. Collective. */
+static remap_status arrange(job *j, rm_arrivals *a, remap_side side, rm_lid **place)
 {
-  int64_t kept = 0;
+  rm_rows     *rows    = &j->mapping->rows[side];
+  rows_draft  *draft   = &j->draft[side];
+  rm_arena    *scratch = rm_arena_new();
+  double      *volume;
+  remap_status status = scratch ? REMAP_OK : REMAP_NO_MEMORY;
 
-  for (int64_t k = 0; k < n; k++) {
-    is_cut[record[k].receiver] |= record[k].is_cut != 0;
-    if (record[k].giver < 0) continue;
-    if (kept < k) {
-      if (second) memcpy(second[kept], second[k], sizeof *second);
-      record[kept] = record[k];
-    }
-    kept++;
+  *place = rm_arena_alloc(j->passing, a->num, sizeof **place);
+  if (!*place) status = REMAP_NO_MEMORY;
+  RM_GOTO(done, status = rm_comm_agree(j->comm, status, NULL));
+  RM_GOTO(done, status = fetch_givers(scratch, j->comm, j->mesh[1 - side], rows, draft, &volume));
+  status = rm_comm_agree(j->comm, order_pairs(scratch, j, a, rows, draft, volume, *place), NULL);
+done:
+  rm_arena_drop(scratch);
+  if (status == REMAP_OK) rm_arrivals_permute(a, *place);
+  return status;
+}
+
+/* An array of the arrivals, *data, becomes the arena's, cut off after n elements. It moves from *data to *out. */
+static remap_status keep(rm_arena *arena, void *data, int64_t n, size_t size, void *out)
+{
+  static void *const none = NULL;
+  const size_t       bytes = n > 0 ? (size_t)n * size : 1;
+  void              *array;
+
+  memcpy(&array, data, sizeof array); /* data and out point to pointers of some type */
+  array = realloc(array, bytes);
+  if (!array) return REMAP_NO_MEMORY;
+  memcpy(data, &array, sizeof array);
+  RM_TRY(rm_arena_adopt(arena, array, bytes));
+  memcpy(out, &array, sizeof array);
+  memcpy(data, &none, sizeof none);
+  return REMAP_OK;
+}
+
+static remap_status keep_target(job *j, rm_arrivals *a, rows_draft *draft, const rm_lid *place)
+{
+  RM_TRY(keep(j->arena, &a->volume, a->num, sizeof *a->volume, &draft->volume));
+  RM_TRY(keep(j->arena, &a->moment, a->num, sizeof *a->moment, &draft->moment));
+  RM_NEW(j->place_of, j->passing, a->num);
+  for (int64_t k = 0; k < a->num; k++) j->place_of[place[k]] = (rm_lid)k;
+  return REMAP_OK;
+}
+
+static remap_status keep_source(job *j, rm_arrivals *a, rows_draft *draft, rm_rows *rows)
+{
+  const double *of_target = j->draft[REMAP_TARGET].volume;
+
+  RM_NEW(draft->volume, j->passing, a->num);
+  draft->moment = NULL;
+  for (int64_t k = 0; k < a->num; k++) {
+    if (a->twin[k] >= 0) a->twin[k] = j->place_of[a->twin[k]];
+    draft->volume[k] = a->twin[k] >= 0 ? of_target[a->twin[k]] : a->volume[-1 - a->twin[k]];
   }
-  return kept;
+  RM_TRY(keep(j->arena, &a->twin, a->num, sizeof *a->twin, &rows->twin));
+  RM_TRY(keep(j->arena, &a->volume, a->num_held, sizeof *a->volume, &rows->away_volume));
+  return keep(j->arena, &a->moment, a->num_held, sizeof *a->moment, &rows->away_moment);
 }
 
 /* How much of a cell with pairs is covered. A skin that passes through it leaves a part outside, unless what is left is not
@@ -281,52 +198,28 @@ static remap_cover cover_of(const rows_draft *draft, rm_lid cell, double cell_vo
   return rint(rm_compensated_value(&sum) / cell_volume) == 1.0 ? REMAP_COVERED : REMAP_PARTIAL;
 }
 
-/* Rows of one side out of what came, which is reordered. What stays to be filled in is `same` and the plan. */
-static remap_status fill_rows(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
-                              const rm_mesh *mesh, shipment *in, rows_draft *draft, rm_rows *rows, rm_reason *reason)
+/* What rows are of arrivals that stand in order, but for `same` and what rests on that. Not collective. */
+static remap_status fill_rows(job *j, rm_arrivals *a, remap_side side, const rm_lid *place)
 {
-  const pair_record *record = in->pair;
-  int64_t            n      = in->pair_offset[comm->size];
-  double            *volume;
-  rm_lid            *place;
-  uint8_t           *is_cut;
+  rows_draft    *draft = &j->draft[side];
+  rm_rows       *rows  = &j->mapping->rows[side];
+  const rm_mesh *mesh  = j->mesh[side];
 
-  if (n > INT32_MAX)
-    return rm_fail(REMAP_TOO_LARGE, reason, mesh->side, -1, "%lld pairs come to one rank; use more ranks", (long long)n);
-  rows->num_cells = mesh->num_cells;
-  RM_NEW0(is_cut, scratch, mesh->num_cells);
-  RM_TRY(list_givers(arena, scratch, comm, in, draft, rows, &volume));
-  n = mark_cut(n, in->pair, in->second, is_cut);
-  RM_TRY(new_rows(arena, mesh->num_cells, n, in->second != NULL, draft));
-  RM_NEW(place, scratch, n);
-  for (int64_t k = 0; k < n; k++) {
-    RM_ASSERT(record[k].receiver >= 0 && record[k].receiver < mesh->num_cells);
-    draft->offset[record[k].receiver]++;
-  }
-  rm_offsets(draft->offset, mesh->num_cells);
-  RM_TRY(sort_rows(scratch, frame, n, record, volume, draft, rows, place));
-  for (rm_lid c = 0; c < mesh->num_cells; c++) {
-    for (int64_t k = draft->offset[c]; k < draft->offset[c + 1]; k++) {
-      const pair_record *p = &record[place[k]];
-
-      draft->giver[k]  = p->giver;
-      draft->volume[k] = p->volume;
-      for (int d = 0; d < 3; d++) draft->moment[k][d] = p->moment[d];
-      for (int d = 0; d < 6 && in->second; d++) draft->second[k][d] = in->second[place[k]][d];
-    }
-    if (draft->offset[c] == draft->offset[c + 1]) continue; /* uncovered */
-    draft->cover[c] = (uint8_t)cover_of(draft, c, mesh->cell_volume[c], is_cut[c] != 0);
-  }
+  if (side == REMAP_TARGET) RM_TRY(keep_target(j, a, draft, place));
+  else RM_TRY(keep_source(j, a, draft, rows));
+  RM_TRY(keep(j->arena, &a->giver, a->num, sizeof *a->giver, &rows->giver));
+  if (a->second) RM_TRY(keep(j->arena, &a->second, a->num, sizeof *a->second, &rows->second));
+  for (rm_lid c = 0; c < mesh->num_cells; c++)
+    if (draft->offset[c] < draft->offset[c + 1]) /* else uncovered */
+      draft->cover[c] = (uint8_t)cover_of(draft, c, mesh->cell_volume[c], a->is_cut[c] != 0);
   return REMAP_OK;
 }
 
 static void publish(const rows_draft *draft, rm_rows *rows)
 {
   rows->offset         = draft->offset;
-  rows->giver          = draft->giver;
   rows->volume         = draft->volume;
   rows->moment         = (const double(*)[3])draft->moment;
-  rows->second         = (const double(*)[6])draft->second;
   rows->same           = draft->same;
   rows->cover          = draft->cover;
   rows->centroid_error = (const double(*)[3])draft->centroid_error;
@@ -337,28 +230,21 @@ static void publish(const rows_draft *draft, rm_rows *rows)
 }
 
 /* One side's rows, without `same`. Collective. */
-static remap_status bring_home(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
-                               const rm_part *part, const rm_moments *moments, rows_draft *draft, rm_rows *rows,
-                               rm_reason *reason)
+static remap_status make_rows(job *j, rm_arrivals *a, remap_side side)
 {
-  rm_arena    *scratch = rm_arena_new(), *leaving = rm_arena_new(); /* leaving: what is sent */
-  shipment     out = {.second = NULL}, in = {.second = NULL};
-  remap_status status = new_offsets(leaving, comm, &out);
+  rm_rows     *rows   = &j->mapping->rows[side];
+  rows_draft  *draft  = &j->draft[side];
+  remap_status status = new_rows(j->arena, j->mesh[side]->num_cells, draft);
+  rm_lid      *place;
 
-  if (status == REMAP_OK) status = new_offsets(scratch, comm, &in);
-  if (status == REMAP_OK) status = pack_pairs(leaving, comm, part, moments, mesh->side, &out);
-  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = ship(scratch, comm, &out, moments->second != NULL, &in));
-  rm_arena_drop(leaving);
-  leaving = NULL;
-  status  = fill_rows(arena, scratch, comm, frame, mesh, &in, draft, rows, reason);
-  RM_GOTO(done, status = rm_comm_agree_reason(comm, status, reason));
+  rows->num_cells = j->mesh[side]->num_cells;
+  if (status == REMAP_OK) status = sort_givers(j->arena, a, draft, rows);
+  RM_TRY(rm_comm_agree(j->comm, status, NULL));
+  RM_TRY(rm_plan_build(j->comm, j->arena, rows->num_givers, draft->giver_rank, draft->giver_cell, &rows->plan));
+  RM_TRY(arrange(j, a, side, &place));
+  RM_TRY(rm_comm_agree(j->comm, fill_rows(j, a, side, place), NULL));
   publish(draft, rows);
-  status = rm_plan_build(comm, arena, rows->num_givers, rows->giver_rank, rows->giver_cell, &rows->plan);
-done:
-  rm_arena_drop(leaving);
-  rm_arena_drop(scratch);
-  return status;
+  return REMAP_OK;
 }
 
 /* 1 for each covered cell with a single pair that has its volume. (Where no skin passes through a cell, that is its own volume
@@ -401,30 +287,51 @@ static remap_status mark_same(const rm_comm *comm, const rm_mesh *const mesh[2],
       const int64_t k = rows[side].offset[c];
 
       if (!alone[side][c] || !heard[side][rows[side].giver[k]]) continue;
-      draft[side].same[k]   = 1;
+      draft[side].same[c]   = 1;
       draft[side].volume[k] = mesh[side]->cell_volume[c];
-      for (int d = 0; d < 3; d++) draft[side].moment[k][d] = 0.0;
+      for (int d = 0; d < 3 && draft[side].moment; d++) draft[side].moment[k][d] = 0.0;
     }
 done:
   rm_arena_drop(scratch);
   return status;
 }
 
+/* What pair k of a source cell holds, about the target cell's centroid; not of cells that are the same. Returns its volume. */
+static double turn_round(const rm_mapping *mapping, const rm_mesh *mesh, rm_lid cell, int64_t k, double moment[3])
+{
+  const rm_rows *rows = &mapping->rows[REMAP_SOURCE], *back = &mapping->rows[REMAP_TARGET];
+  const rm_lid   twin = rows->twin[k];
+
+  if (twin < 0) {
+    memcpy(moment, rows->away_moment[-1 - twin], 3 * sizeof *moment);
+    return rows->away_volume[-1 - twin];
+  }
+  for (int d = 0; d < 3; d++)
+    moment[d] = back->moment[twin][d] +
+                (mesh->cell_centroid[cell][d] - rows->giver_centroid[rows->giver[k]][d]) * back->volume[twin];
+  return back->volume[twin];
+}
+
 /* Where the pairs of a covered cell put its centroid, less where the mesh has it. Far from the origin the latter is rounded to
  * a good part of a cell's size; a slope about it would carry content that the cell does not have. Not collective. */
-static void find_centroid_errors(const rm_mesh *mesh, const rm_rows *rows, rows_draft *draft)
+static void find_centroid_errors(const rm_mesh *mesh, const rm_mapping *mapping, rows_draft *draft)
 {
+  const rm_rows *rows = &mapping->rows[mesh->side];
+
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     const int64_t  first = rows->offset[c], end = rows->offset[c + 1];
     const double  *centroid  = mesh->cell_centroid[c];
     rm_compensated moment[3] = {{0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
 
-    if (rows->cover[c] != REMAP_COVERED || rows->same[first] || !(fabs(mesh->cell_volume[c]) > 0.0)) continue;
+    if (rows->cover[c] != REMAP_COVERED || rows->same[c] || !(fabs(mesh->cell_volume[c]) > 0.0)) continue;
     for (int64_t k = first; k < end; k++) {
       const double *other = rows->giver_centroid[rows->giver[k]]; /* about which this row's moments are */
 
-      for (int d = 0; d < 3; d++)
-        rm_compensated_add(&moment[d], rows->moment[k][d] + (other[d] - centroid[d]) * rows->volume[k]);
+      double        own[3];
+
+      if (mesh->side == REMAP_TARGET) memcpy(own, rows->moment[k], sizeof own);
+      else turn_round(mapping, mesh, c, k, own);
+      for (int d = 0; d < 3; d++) rm_compensated_add(&moment[d], own[d] + (other[d] - centroid[d]) * rows->volume[k]);
     }
     for (int d = 0; d < 3; d++) {
       const double error = rm_compensated_value(&moment[d]) / mesh->cell_volume[c];
@@ -501,20 +408,74 @@ static remap_status count_all(const rm_comm *comm, const rm_mesh *const mesh[2],
   return REMAP_OK;
 }
 
+static remap_status close_both(job *j, rm_gathering *g)
+{
+  static const remap_side order[2] = {REMAP_TARGET, REMAP_SOURCE}; /* sources look up the pairs of targets */
+
+  for (int k = 0; k < 2; k++) RM_TRY(make_rows(j, &g->of[order[k]], order[k]));
+  RM_TRY(mark_same(j->comm, j->mesh, j->mapping->rows, j->draft));
+  for (int side = 0; side < 2; side++) find_centroid_errors(j->mesh[side], j->mapping, &j->draft[side]);
+  RM_TRY(count_all(j->comm, j->mesh, j->mapping));
+  j->mapping->rows[REMAP_SOURCE].volume = NULL; /* it ends here */
+  return REMAP_OK;
+}
+
+remap_status rm_mapping_close(rm_arena *arena, rm_gathering *g, const rm_comm *comm, const rm_frame *frame,
+                              const rm_mesh *const mesh[2], const rm_mapping **out)
+{
+  job          j      = {.arena = arena, .passing = rm_arena_new(), .comm = comm, .frame = frame, .mesh = mesh};
+  remap_status status = REMAP_NO_MEMORY;
+
+  j.mapping = rm_arena_zero(arena, 1, sizeof *j.mapping);
+  if (j.mapping && j.passing) status = REMAP_OK;
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = close_both(&j, g));
+  RM_ASSERT(rm_mapping_check(j.mapping, mesh) != REMAP_INTERNAL);
+  *out = j.mapping;
+done:
+  rm_arena_drop(j.passing);
+  return status;
+}
+
+remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], const rm_mapping *mapping,
+                                 const rm_mapping **out)
+{
+  const rm_mesh *source = mesh[REMAP_SOURCE];
+  const rm_rows *rows   = &mapping->rows[REMAP_SOURCE];
+  const int64_t  n      = rows->offset[rows->num_cells];
+  rm_mapping    *all;
+  double        *volume, (*moment)[3];
+
+  RM_NEW(all, arena, 1);
+  RM_NEW(volume, arena, n);
+  RM_NEW(moment, arena, n);
+  for (rm_lid c = 0; c < rows->num_cells; c++)
+    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++) {
+      if (rows->same[c]) {
+        volume[k] = source->cell_volume[c];
+        for (int d = 0; d < 3; d++) moment[k][d] = 0.0;
+      } else {
+        volume[k] = turn_round(mapping, source, c, k, moment[k]);
+      }
+    }
+  *all                           = *mapping;
+  all->rows[REMAP_SOURCE].volume = volume;
+  all->rows[REMAP_SOURCE].moment = (const double(*)[3])moment;
+  *out                           = all;
+  RM_ASSERT(rm_mapping_check(all, mesh) != REMAP_INTERNAL);
+  return REMAP_OK;
+}
+
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason)
 {
-  rm_mapping *mapping = rm_arena_zero(arena, 1, sizeof *mapping);
-  rows_draft  draft[2];
+  rm_gathering     *g      = rm_mapping_open(mesh, moments->second != NULL);
+  const rm_mapping *short_of_sources;
+  remap_status      status = rm_comm_agree(comm, g ? REMAP_OK : REMAP_NO_MEMORY, NULL);
 
-  RM_TRY(rm_comm_agree(comm, mapping ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(mapping);
-  for (int side = 0; side < 2; side++)
-    RM_TRY(bring_home(arena, comm, frame, mesh[side], part, moments, &draft[side], &mapping->rows[side], reason));
-  RM_TRY(mark_same(comm, mesh, mapping->rows, draft));
-  for (int side = 0; side < 2; side++) find_centroid_errors(mesh[side], &mapping->rows[side], &draft[side]);
-  RM_TRY(count_all(comm, mesh, mapping));
-  RM_ASSERT(rm_mapping_check(mapping, mesh) != REMAP_INTERNAL);
-  *out = mapping;
-  return REMAP_OK;
+  if (status == REMAP_OK) status = rm_mapping_add(g, comm, part, moments, reason);
+  if (status == REMAP_OK) status = rm_mapping_close(arena, g, comm, frame, mesh, &short_of_sources);
+  if (status == REMAP_OK) status = rm_comm_agree(comm, rm_mapping_complete(arena, mesh, short_of_sources, out), NULL);
+  rm_gathering_drop(g);
+  return status;
 }

@@ -13,16 +13,20 @@ static inline bool rm_is_mapped(uint8_t cover) { return cover == REMAP_PARTIAL |
 /* The pairs of the cells of one side (the receiving cells), on the rank that handed them in. Read-only once built. Invariants:
  *   a row's pairs ascend by the giving cell's (Morton key of the centroid, centroid, volume, global id);
  *   giver[] points into the halo lists; each (rank, cell) is listed once there, ascending;
- *   same[k] only if the pair is alone in its row and in its partner's row and both cells are covered: then volume[k] is this
- *   cell's own volume and moment[k] is 0. */
+ *   same[] of a cell only if its pair is alone in its row and in its partner's row and both cells are covered: then the pair's
+ *   volume is this cell's own and its moment is 0. */
 typedef struct rm_rows {
   rm_lid         num_cells;    /* receiving cells                                                          */
   const int64_t *offset;       /* [num_cells + 1]                                                          */
   const rm_lid  *giver;        /* [offset[num_cells]] place in the halo of giving cells                    */
-  const double  *volume;       /* [same] V, own frame                                                      */
-  const double (*moment)[3];   /* [same] integral of (x - c), c the GIVING cell's centroid                 */
-  const double (*second)[6];   /* [same] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if the moments had none */
-  const uint8_t *same;         /* [same]                                                                   */
+  const double  *volume;       /* [offset[num_cells]] V, own frame; of source cells NULL until rm_mapping_complete */
+  const double (*moment)[3];   /* [likewise] integral of (x - c), c the GIVING cell's centroid                     */
+  const double (*second)[6];   /* [offset[num_cells]] integral of (x - c)(x - c)^T: xx, yy, zz, xy, xz, yz; NULL if the moments
+                                  had none                                                                         */
+  const rm_lid  *twin;         /* [likewise] of source cells, what the two above are made of: the pair of the target cell, if
+                                  that has the same home, or -1 - its place among those that are away              */
+  const double  *away_volume, (*away_moment)[3];
+  const uint8_t *same;         /* [num_cells]                                                              */
   const uint8_t *cover;        /* [num_cells] remap_cover; UNWANTED only by rm_mapping_mask                */
   const double (*centroid_error)[3]; /* [num_cells] true centroid less rm_mesh's, by which moments about the latter do not add
                                   up to 0: what rounding took, at most 2^-48 of it; 0 where the pairs do not tell it (cells
@@ -45,17 +49,35 @@ typedef struct rm_mapping {
   rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
 } rm_mapping;
 
-/* Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the
+/* Pairs on their way home. */
+typedef struct rm_gathering rm_gathering;
+/* Without pairs yet; with second moments or without. The caller owns it: rm_gathering_drop. NULL if memory is out. Not
+ * collective. */
+rm_gathering *rm_mapping_open(const rm_mesh *const mesh[2], bool has_second);
+void rm_gathering_drop(rm_gathering *gathering);
+/* Send the pairs of a part home; part and moments may end then. Every pair is added once, by whichever rank and in whichever
+ * call. Collective. TOO_LARGE if 2^31 or more come to one rank. */
+remap_status rm_mapping_add(rm_gathering *gathering, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
+                            rm_reason *reason);
+/* Rows of all pairs that were added, which the gathering then has no longer; those of source cells without volume and moment.
+ * Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the
  * pairs leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
+remap_status rm_mapping_close(rm_arena *arena, rm_gathering *gathering, const rm_comm *comm, const rm_frame *frame,
+                              const rm_mesh *const mesh[2], const rm_mapping **out);
+/* The same mapping with volume and moment of the source cells' rows too, 32 bytes per pair. Not collective. Lives in arena and
+ * borrows from mapping. O(pairs). NO_MEMORY. */
+remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], const rm_mapping *mapping,
+                                 const rm_mapping **out);
+/* All of it, of one part. Collective. Lives in arena. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
 /* What a mask says of a cell: it takes no part; it does; it does, but has no pairs. */
 enum { RM_MASK_OUT = 0, RM_MASK_IN = 1, RM_MASK_BARE = 2 };
 
-/* The same mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving cells]
- * and gives [giving cells], both RM_MASK_IN. Of the receiving side: cells that are OUT are UNWANTED, without pairs; others lose
- * pairs, and are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is left.
- * Collective. Lives in arena and borrows from mapping. O(pairs). */
+/* A complete mapping with only those pairs whose receiving cell wants values and whose giving cell gives: wants [receiving
+ * cells] and gives [giving cells], both RM_MASK_IN. Of the receiving side: cells that are OUT are UNWANTED, without pairs;
+ * others lose pairs, and are PARTIAL, or UNCOVERED if none is left. Of the giving side likewise. cells_by_cover counts what is
+ * left. Collective. Lives in arena and borrows from mapping. O(pairs). */
 remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapping *mapping, remap_side receiving,
                              const uint8_t *wants, const uint8_t *gives, const rm_mapping **out);
 /* Every invariant that one rank can see; slow. Not collective. */

@@ -21,7 +21,7 @@ static remap_status make_room(rm_arena *arena, const rm_rows *rows, draft *d)
   RM_NEW(d->moment, arena, n);
   d->second = NULL;
   if (rows->second) RM_NEW(d->second, arena, n);
-  RM_NEW(d->same, arena, n);
+  RM_NEW(d->same, arena, rows->num_cells);
   RM_NEW(d->cover, arena, rows->num_cells);
   return REMAP_OK;
 }
@@ -41,9 +41,10 @@ static void filter(const rm_rows *rows, const uint8_t *own, const uint8_t *other
       d->volume[num] = rows->volume[k];
       for (int i = 0; i < 3; i++) d->moment[num][i] = rows->moment[k][i];
       for (int i = 0; i < 6 && d->second; i++) d->second[num][i] = rows->second[k][i];
-      d->same[num++] = rows->same[k];
+      num++;
     }
     d->offset[c + 1] = num;
+    d->same[c]       = rows->same[c] && num > before;
     d->cover[c]      = own[c] == RM_MASK_OUT             ? REMAP_UNWANTED
                        : num - before == end - first    ? rows->cover[c]
                        : num == before                  ? REMAP_UNCOVERED

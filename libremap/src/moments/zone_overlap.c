@@ -7,16 +7,19 @@
 
 typedef struct candidates {
   const rm_piece   *piece;
-  const rm_trimesh *mesh;
-  const rm_lid     *zone; /* [cells] */
+  const rm_lid     *zone;        /* [cells] */
+  const double    (*box)[6];     /* [cells] */
+  const rm_lid     *skin;        /* faces   */
+  const double    (*skin_box)[6];
+  const rm_boxtree *tree;        /* over the skin */
   rm_lid            cell;
   uint8_t          *entered, *entering; /* [cells] marks */
 } candidates;
 
 static int mark(void *user, rm_lid s)
 {
-  candidates   *c = user;
-  const rm_lid *side = c->mesh->side[c->mesh->skin[s]], owner = side[0] >= 0 ? side[0] : side[1];
+  candidates  *c     = user;
+  const rm_lid owner = c->piece->face_cell[c->skin[s]][0];
 
   if (c->zone[owner] != c->zone[c->cell]) c->entered[c->cell] = c->entering[owner] = 1;
   return 0;
@@ -130,13 +133,55 @@ static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const
   return REMAP_OK;
 }
 
-remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, const rm_trimesh *mesh, remap_faces faces,
-                                  int64_t num_zones, const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out,
-                                  rm_reason *reason)
+static void widen(double box[6], const double other[6])
+{
+  for (int d = 0; d < 3; d++) {
+    box[d]     = fmin(box[d], other[d]);
+    box[d + 3] = rm_max(box[d + 3], other[d + 3]);
+  }
+}
+
+/* The boxes of a piece's cells, and its faces in the skin of the mesh with theirs. */
+static remap_status find_boxes(rm_arena *arena, candidates *c)
+{
+  static const double nothing[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+  const rm_piece     *p          = c->piece;
+  rm_lid             *skin, num = 0;
+  double            (*box)[6], (*skin_box)[6];
+
+  for (rm_lid f = 0; f < p->num_faces; f++) num += p->face_is_skin[f];
+  RM_NEW(box, arena, p->num_cells);
+  RM_NEW(skin, arena, num);
+  RM_NEW(skin_box, arena, num);
+  for (rm_lid k = 0; k < p->num_cells; k++) memcpy(box[k], nothing, sizeof nothing);
+  num = 0;
+  for (rm_lid f = 0; f < p->num_faces; f++) {
+    double own[6];
+
+    memcpy(own, nothing, sizeof own);
+    for (int64_t k = p->face_offset[f]; k < p->face_offset[f + 1]; k++) {
+      const double *x = p->node_xyz[p->face_node[k]];
+
+      widen(own, (const double[6]){x[0], x[1], x[2], x[0], x[1], x[2]});
+    }
+    for (int h = 0; h < 2; h++)
+      if (p->face_cell[f][h] >= 0) widen(box[p->face_cell[f][h]], own);
+    if (!p->face_is_skin[f]) continue;
+    memcpy(skin_box[num], own, sizeof own);
+    skin[num++] = f;
+  }
+  c->box      = (const double(*)[6])box;
+  c->skin     = skin;
+  c->skin_box = (const double(*)[6])skin_box;
+  return rm_boxtree_build(arena, num, c->skin_box, &c->tree);
+}
+
+remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, remap_faces faces, int64_t num_zones,
+                                  const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason)
 {
   rm_arena    *arena  = rm_arena_new();
   remap_status status = arena ? REMAP_OK : REMAP_NO_MEMORY;
-  candidates   c      = {.piece = piece, .mesh = mesh};
+  candidates   c      = {.piece = piece};
   rm_lid      *zone;
   bool         any = false;
 
@@ -145,12 +190,12 @@ remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, 
     c.zone     = zone = rm_arena_alloc(arena, piece->num_cells, sizeof *zone);
     c.entered  = rm_arena_zero(arena, piece->num_cells, 1);
     c.entering = rm_arena_zero(arena, piece->num_cells, 1);
-    status     = zone && c.entered && c.entering ? REMAP_OK : REMAP_NO_MEMORY;
+    status     = zone && c.entered && c.entering ? find_boxes(arena, &c) : REMAP_NO_MEMORY;
     for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++)
       zone[k] = zone_of(num_zones, zone_cell_offset, piece->cell_global[k]);
     for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++) {
       c.cell = k;
-      rm_boxtree_query(mesh->skin_tree, mesh->skin_box, mesh->cell_box[k], mark, &c);
+      rm_boxtree_query(c.tree, c.skin_box, c.box[k], mark, &c);
       any |= c.entered[k];
     }
     if (status == REMAP_OK && any)

@@ -13,8 +13,7 @@ typedef struct rm_zone_overlap {
  * cells from zone_cell_offset[z] up to zone_cell_offset[z + 1]. Rounding: an overlap no deeper, over the smaller cell's
  * surface, than 2^-20 of `magnitude`, the whole mesh's largest coordinate, which single precision stays well below. Not
  * collective. O(n) for zones that join; patched interfaces cost an overlay of the layers beside them. */
-remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, const rm_trimesh *mesh, remap_faces faces,
-                                  int64_t num_zones, const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out,
-                                  rm_reason *reason);
+remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, remap_faces faces, int64_t num_zones,
+                                  const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason);
 
 #endif

@@ -64,7 +64,8 @@ static remap_status list_giants(rm_arena *scratch, const rm_tags *tags, int64_t 
       const rm_tag *tag = &tags->tag[side][k];
 
       if (!tag->is_giant) continue;
-      giant[n] = (rm_giant){.key = tag->key, .side = side, .home_rank = tag->home_rank, .cell = tag->cell};
+      giant[n] = (rm_giant){.key = tag->key, .side = side, .home_rank = tag->home_rank, .cell = tag->cell,
+                            .num_triangles = tag->num_triangles};
       memcpy(giant[n++].box, tags->box[side][k], sizeof giant->box);
     }
   RM_ASSERT(n == num);

@@ -1,123 +1,269 @@
-/* match -- which cells each rank needs, and so which cells each home sends. Pairs are made
+/* match -- which cells each rank needs in each round, and so which cells each home sends. Pairs are made
  *
  *     source   target      at
  *     any      small       the seat of the target
  *     small    giant       the seat of the source
  *     giant    giant       the seat of the target
  *
- * A rank needs the targets seated there, the source cells whose boxes they meet, and the other partners of its pairs. It knows
- * the boxes of all that may be, so no cell is sent in vain. O(n log n) time. */
+ * A seat is a block of a rank. It needs the targets seated there, the source cells whose boxes they meet, and the other
+ * partners of its pairs. A rank knows the boxes of all that may be, so no cell is sent in vain. O(n log n) time. */
 #include "part/part_private.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
+
+enum {
+  MOST_BLOCKS = 1 << 12,
+  OUTSIDE     = 4 /* a coordinate that no cell reaches: those of the frame are below 1 in magnitude */
+};
+
+/* The wants of one side, in no order: key is the home's rank and the cell's number there, item the role. */
+typedef struct list {
+  int64_t   num, room;
+  rm_keyed *want; /* malloc'ed */
+} list;
+
+/* What one round overlays. */
+typedef struct block {
+  rm_lid            num_small;    /* targets seated here that are no giants */
+  const double    (*small)[6];    /* their boxes                            */
+  const rm_boxtree *small_tree;
+  uint8_t          *is_wanted;    /* [giants->num] */
+  list              wants[2];     /* [side]        */
+} block;
 
 /* What this rank's decisions rest on. */
 typedef struct here {
+  rm_arena         *arena;         /* of the blocks and their trees                 */
   const rm_comm    *comm;
   const rm_cuts    *cuts;
   const rm_tags    *tags;
   const rm_giants  *giants;
-  rm_lid            num_small;    /* targets seated here that are no giants */
-  const double    (*small)[6];    /* their boxes                            */
-  const rm_boxtree *small_tree;
-  rm_visitors       visitors;      /* sources of other seats                */
-  uint8_t          *is_wanted;     /* [giants->num] */
+  rm_visitors       visitors;      /* sources of other seats                        */
+  rm_cuts           inner;         /* of this rank's interval into blocks           */
+  block            *block;         /* [inner.num + 1]                               */
+  const double    (*block_box)[6]; /* [inner.num + 1] around the small targets      */
+  const rm_boxtree *block_tree;    /* over them                                     */
+  int64_t           once, often;   /* triangles of sources that are wanted; of each as often as it is */
 } here;
 
-/* A tree over the small targets. Not collective. */
+/* ---- blocks ------------------------------------------------------------------------------------------------------- */
+
+/* Keys at which this rank's tags, of both sides and in order, are cut into num blocks with about as many triangles each. */
+static remap_status cut_inside(rm_arena *arena, const rm_tags *tags, int64_t all, int64_t num, rm_cuts *out)
+{
+  rm_lid    at[2] = {0, 0};
+  int64_t   sum = 0;
+  uint64_t *key;
+
+  RM_NEW(key, arena, num);
+  *out = (rm_cuts){0, key};
+  while (out->num < num - 1 && (at[0] < tags->num[0] || at[1] < tags->num[1])) {
+    const int     side = at[0] == tags->num[0] || (at[1] < tags->num[1] && tags->tag[1][at[1]].key < tags->tag[0][at[0]].key);
+    const rm_tag *tag  = &tags->tag[side][at[side]++];
+
+    if (sum >= (out->num + 1) * (all / num) && (out->num == 0 || tag->key > key[out->num - 1])) key[out->num++] = tag->key;
+    sum += tag->num_triangles;
+  }
+  return REMAP_OK;
+}
+
+/* A tree over each block's small targets, and one over the blocks. */
 static remap_status plant(rm_arena *arena, here *h)
 {
   const rm_tags *tags = h->tags;
-  double       (*small)[6];
+  const int      num  = h->inner.num + 1;
+  double       (*small)[6], (*box)[6];
+  rm_lid         n = 0, k = 0;
 
   RM_NEW(small, arena, tags->num[REMAP_TARGET]);
-  RM_NEW0(h->is_wanted, arena, h->giants->num);
-  for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++)
-    if (!tags->tag[REMAP_TARGET][k].is_giant) memcpy(small[h->num_small++], tags->box[REMAP_TARGET][k], sizeof *small);
-  h->small = (const double(*)[6])small;
-  return rm_boxtree_build(arena, h->num_small, h->small, &h->small_tree);
+  RM_NEW(box, arena, num);
+  RM_NEW0(h->block, arena, num);
+  for (int b = 0; b < num; b++) {
+    block *own = &h->block[b];
+
+    own->small = (const double(*)[6])(small + n);
+    for (; k < tags->num[REMAP_TARGET] && rm_part_seat(&h->inner, tags->tag[REMAP_TARGET][k].key) == b; k++)
+      if (!tags->tag[REMAP_TARGET][k].is_giant) memcpy(small[n + own->num_small++], tags->box[REMAP_TARGET][k], sizeof *small);
+    n += own->num_small;
+    for (int d = 0; d < 6; d++) box[b][d] = own->num_small > 0 ? own->small[0][d] : OUTSIDE;
+    for (rm_lid i = 1; i < own->num_small; i++)
+      for (int d = 0; d < 3; d++) {
+        box[b][d]     = fmin(box[b][d], own->small[i][d]);
+        box[b][d + 3] = fmax(box[b][d + 3], own->small[i][d + 3]);
+      }
+    RM_NEW0(own->is_wanted, arena, h->giants->num);
+    RM_TRY(rm_boxtree_build(arena, own->num_small, own->small, &own->small_tree));
+  }
+  h->block_box = (const double(*)[6])box;
+  return rm_boxtree_build(arena, num, h->block_box, &h->block_tree);
 }
 
 /* ---- wants -------------------------------------------------------------------------------------------------------- */
 
-/* The wants of one side, in no order: key is the home's rank and the cell's number there, item the role. */
-typedef struct list {
-  int64_t   num;
-  rm_keyed *want;
-} list;
-
-static void want(list *l, int32_t home_rank, rm_lid cell, int role)
+static remap_status want(list *l, int32_t home_rank, rm_lid cell, int role)
 {
+  RM_TRY(rm_grow(&l->want, &l->room, l->num + 1, sizeof *l->want));
   l->want[l->num++] = (rm_keyed){(uint64_t)home_rank << 32 | (uint64_t)cell, role};
+  return REMAP_OK;
 }
 
-/* A small source seated here meets a giant: if that is a target, both are wanted here. */
+/* A small source and the blocks that want it: those with a target that it meets, and its seat if it meets a giant there. */
 typedef struct partner {
-  const here *h;
-  bool        met;
+  here         *h;
+  const double *box;
+  int32_t       home_rank, num_triangles;
+  rm_lid        cell;
+  int           seat; /* block of this rank, or -1 */
+  bool          is_wanted, is_seated;
+  remap_status  status;
 } partner;
+
+static remap_status want_source(partner *p, int b)
+{
+  p->h->often += p->num_triangles;
+  p->is_wanted = true;
+  p->is_seated |= b == p->seat;
+  return want(&p->h->block[b].wants[REMAP_SOURCE], p->home_rank, p->cell, b == p->seat ? RM_ROLE_SEATED : 0);
+}
+
+static int meet_block(void *user, rm_lid b)
+{
+  partner     *p   = user;
+  const block *own = &p->h->block[b];
+
+  if (rm_boxtree_meets(own->small_tree, own->small, p->box)) p->status = want_source(p, b);
+  return p->status != REMAP_OK;
+}
 
 static int meet_giant(void *user, rm_lid item)
 {
   partner *p = user;
 
   if (p->h->giants->giant[item].side != REMAP_TARGET) return 0;
-  p->met                = true;
-  p->h->is_wanted[item] = 1;
-  return 0;
+  p->h->block[p->seat].is_wanted[item] = 1;
+  if (!p->is_seated) p->status = want_source(p, p->seat);
+  return p->status != REMAP_OK;
 }
 
-static void want_small_sources(here *h, list *l)
+static remap_status want_small_source(partner *p)
+{
+  here *h = p->h;
+
+  (void)rm_boxtree_query(h->block_tree, h->block_box, p->box, meet_block, p);
+  if (p->status == REMAP_OK && p->seat >= 0) (void)rm_boxtree_query(h->giants->tree, h->giants->box, p->box, meet_giant, p);
+  if (p->is_wanted) h->once += p->num_triangles;
+  return p->status;
+}
+
+static remap_status want_small_sources(here *h)
 {
   for (rm_lid k = 0; k < h->tags->num[REMAP_SOURCE]; k++) {
     const rm_tag *tag = &h->tags->tag[REMAP_SOURCE][k];
-    const double *box = h->tags->box[REMAP_SOURCE][k];
-    partner       p   = {h, false};
+    partner       p   = {h, h->tags->box[REMAP_SOURCE][k], tag->home_rank, tag->num_triangles, tag->cell,
+                         rm_part_seat(&h->inner, tag->key), false, false, REMAP_OK};
 
-    if (tag->is_giant) continue;
-    (void)rm_boxtree_query(h->giants->tree, h->giants->box, box, meet_giant, &p);
-    if (p.met || rm_boxtree_meets(h->small_tree, h->small, box)) want(l, tag->home_rank, tag->cell, RM_ROLE_SEATED);
+    if (!tag->is_giant) RM_TRY(want_small_source(&p));
   }
-  for (rm_lid k = 0; k < h->visitors.num; k++)
-    if (rm_boxtree_meets(h->small_tree, h->small, h->visitors.box[k]))
-      want(l, h->visitors.visitor[k].home_rank, h->visitors.visitor[k].cell, 0);
+  for (rm_lid k = 0; k < h->visitors.num; k++) {
+    const rm_visitor *visitor = &h->visitors.visitor[k];
+    partner           p       = {h, h->visitors.box[k], visitor->home_rank, visitor->num_triangles, visitor->cell, -1,
+                                 false, false, REMAP_OK};
+
+    RM_TRY(want_small_source(&p));
+  }
+  return REMAP_OK;
 }
 
-/* Giant sources that meet a small target here; and both partners of pairs of giants whose target has its seat here. */
-static void want_giants(here *h)
+/* The block of this rank in which a giant has its seat, -1: on another rank. */
+static int seat_of_giant(const here *h, const rm_giant *giant)
+{
+  return rm_part_seat(h->cuts, giant->key) == h->comm->rank ? rm_part_seat(&h->inner, giant->key) : -1;
+}
+
+/* Giant sources that meet a small target of a block; and both partners of pairs of giants whose target has its seat there. */
+static void mark_giants(here *h)
 {
   const rm_giant *giant = h->giants->giant;
 
-  for (int64_t g = 0; g < h->giants->num; g++)
+  for (rm_lid g = 0; g < h->giants->num; g++) {
+    const int seat = seat_of_giant(h, &giant[g]);
+
     if (giant[g].side == REMAP_SOURCE) {
-      h->is_wanted[g] |= rm_boxtree_meets(h->small_tree, h->small, giant[g].box);
-    } else if (rm_part_seat(h->cuts, giant[g].key) == h->comm->rank) {
-      for (int64_t i = 0; i < h->giants->num; i++)
-        if (giant[i].side == REMAP_SOURCE && rm_box_meets(giant[i].box, giant[g].box)) h->is_wanted[i] = h->is_wanted[g] = 1;
+      for (int b = 0; b <= h->inner.num; b++)
+        h->block[b].is_wanted[g] |= rm_boxtree_meets(h->block[b].small_tree, h->block[b].small, giant[g].box);
+      continue;
     }
+    for (rm_lid i = 0; i < h->giants->num && seat >= 0; i++)
+      if (giant[i].side == REMAP_SOURCE && rm_box_meets(giant[i].box, giant[g].box))
+        h->block[seat].is_wanted[i] = h->block[seat].is_wanted[g] = 1;
+  }
 }
 
-/* Everything this rank needs. Not collective. */
-static remap_status list_wants(rm_arena *arena, here *h, list l[2])
+static remap_status want_giants(here *h)
+{
+  for (rm_lid g = 0; g < h->giants->num; g++) {
+    const rm_giant *giant = &h->giants->giant[g];
+    const int       seat  = seat_of_giant(h, giant);
+    int64_t         times = 0;
+
+    for (int b = 0; b <= h->inner.num; b++) {
+      if (!h->block[b].is_wanted[g]) continue;
+      RM_TRY(want(&h->block[b].wants[giant->side], giant->home_rank, giant->cell,
+                  RM_ROLE_GIANT | (seat == b ? RM_ROLE_SEATED : 0)));
+      times++;
+    }
+    h->often += times * giant->num_triangles;
+    h->once += times > 0 ? giant->num_triangles : 0;
+  }
+  return REMAP_OK;
+}
+
+/* Everything that this rank needs, block by block. Not collective. */
+static remap_status list_wants(rm_arena *arena, here *h)
 {
   const rm_tags *tags = h->tags;
 
-  RM_NEW(l[REMAP_SOURCE].want, arena, (int64_t)tags->num[REMAP_SOURCE] + h->visitors.num + h->giants->num);
-  RM_NEW(l[REMAP_TARGET].want, arena, (int64_t)h->num_small + h->giants->num);
-  want_giants(h);
-  want_small_sources(h, &l[REMAP_SOURCE]);
+  RM_TRY(plant(arena, h));
+  mark_giants(h);
+  RM_TRY(want_small_sources(h));
   for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++) {
     const rm_tag *tag = &tags->tag[REMAP_TARGET][k];
 
-    if (!tag->is_giant) want(&l[REMAP_TARGET], tag->home_rank, tag->cell, RM_ROLE_SEATED);
+    if (!tag->is_giant)
+      RM_TRY(want(&h->block[rm_part_seat(&h->inner, tag->key)].wants[REMAP_TARGET], tag->home_rank, tag->cell, RM_ROLE_SEATED));
   }
-  for (int64_t g = 0; g < h->giants->num; g++) {
-    const rm_giant *giant = &h->giants->giant[g];
-    const bool      sits  = rm_part_seat(h->cuts, giant->key) == h->comm->rank;
+  return want_giants(h);
+}
 
-    if (h->is_wanted[g]) want(&l[giant->side], giant->home_rank, giant->cell, RM_ROLE_GIANT | (sits ? RM_ROLE_SEATED : 0));
+static void drop_blocks(here *h)
+{
+  for (int b = 0; b <= h->inner.num && h->block; b++)
+    for (int side = 0; side < 2; side++) free(h->block[b].wants[side].want);
+  rm_arena_drop(h->arena);
+  h->arena = NULL;
+  h->block = NULL;
+  h->once = h->often = 0;
+}
+
+/* Cut into as few blocks as have no more triangles each than asked for, about; into fewer where too many sources would come
+ * more than once, for what meets many blocks is triangulated with each of them. Not collective. */
+static remap_status choose_blocks(here *h, const rm_slicing *slicing)
+{
+  int64_t all = 0, num;
+
+  for (int side = 0; side < 2; side++)
+    for (rm_lid k = 0; k < h->tags->num[side]; k++) all = rm_add_sat(all, h->tags->tag[side][k].num_triangles);
+  num = all / slicing->triangles + 1;
+  for (num = num < MOST_BLOCKS ? num : MOST_BLOCKS;; num /= 2) {
+    h->arena = rm_arena_new();
+    if (!h->arena) return REMAP_NO_MEMORY;
+    RM_TRY(cut_inside(h->arena, h->tags, all, num, &h->inner));
+    RM_TRY(list_wants(h->arena, h));
+    if (num == 1 || (double)(h->often - h->once) <= slicing->repeats * (double)all) return REMAP_OK;
+    drop_blocks(h);
   }
-  return REMAP_OK;
 }
 
 /* Sort one side's wants by home and number there, and part them into what to ask whom and what it is. Not collective. */
@@ -142,32 +288,55 @@ static remap_status sort_wants(rm_arena *arena, rm_arena *scratch, const rm_comm
 }
 
 /* Ask the homes of one side for the cells on a list. Collective. */
-static remap_status ask(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, list *l, int side, rm_routes *out)
+static remap_status ask(rm_arena *arena, const rm_comm *comm, list *l, int side, rm_round *out)
 {
-  int64_t     *offset = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
-  rm_lid      *cell   = NULL;
-  rm_route    *route  = &out->of[side];
+  rm_arena    *scratch = rm_arena_new();
+  int64_t     *offset  = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset) : NULL;
+  rm_lid      *cell    = NULL;
+  rm_route    *route   = &out->of[side];
   void        *asked;
   remap_status status;
 
   route->offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *route->offset);
   status = offset && route->offset ? sort_wants(arena, scratch, comm, l, offset, &cell, &out->role[side]) : REMAP_NO_MEMORY;
-  RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_TRY(rm_comm_exchange(comm, arena, sizeof *cell, offset, cell, route->offset, &asked));
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = rm_comm_exchange(comm, arena, sizeof *cell, offset, cell, route->offset, &asked));
   route->cell    = asked;
   out->num[side] = (rm_lid)l->num;
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+/* Ask for all rounds. A rank with fewer blocks than others wants nothing in the last ones. Collective. */
+static remap_status ask_all(rm_arena *arena, here *h, rm_routes *out)
+{
+  const rm_comm *comm = h->comm;
+  int64_t        num  = h->inner.num + 1;
+  list           none[2] = {{0, 0, NULL}, {0, 0, NULL}};
+
+  RM_TRY(rm_comm_max_i64(comm, &num, 1));
+  out->num   = (int)num;
+  out->round = rm_arena_alloc(arena, num, sizeof *out->round);
+  RM_TRY(rm_comm_agree(comm, out->round ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  for (int r = 0; r < out->num; r++) {
+    list *wants = r <= h->inner.num ? h->block[r].wants : none;
+
+    for (int side = 0; side < 2; side++) RM_TRY(ask(arena, comm, &wants[side], side, &out->round[r]));
+  }
   return REMAP_OK;
 }
 
 remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
-                           const rm_giants *giants, rm_routes *out)
+                           const rm_giants *giants, const rm_slicing *slicing, rm_routes *out)
 {
-  here      h = {.comm = comm, .cuts = cuts, .tags = tags, .giants = giants};
-  list      l[2] = {{0, NULL}, {0, NULL}};
+  here         h = {.comm = comm, .cuts = cuts, .tags = tags, .giants = giants};
+  remap_status status;
 
-  RM_TRY(rm_comm_agree(comm, plant(scratch, &h), NULL));
   RM_TRY(rm_part_receive_visitors(scratch, comm, tags, &h.visitors));
-  RM_TRY(rm_comm_agree(comm, list_wants(scratch, &h, l), NULL));
-  for (int side = 0; side < 2; side++) RM_TRY(ask(arena, scratch, comm, &l[side], side, out));
-  return REMAP_OK;
+  RM_GOTO(done, status = rm_comm_agree(comm, choose_blocks(&h, slicing), NULL));
+  status = ask_all(arena, &h, out);
+done:
+  drop_blocks(&h);
+  return status;
 }

@@ -3,6 +3,10 @@
  * product, the routes, and the tags or what one mesh sends and receives. */
 #include "part/part_private.h"
 
+#include <math.h>
+
+const rm_slicing rm_one_block = {INT64_MAX, INFINITY};
+
 /* Weigh the tags where they are, and move them into intervals of even work. Collective. *moved lives in arena. */
 static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], rm_tags *tags,
                             rm_giants *giants, rm_cuts *cuts, rm_tags *moved, rm_reason *reason)
@@ -38,7 +42,8 @@ done:
 
 /* One rank needs no balance. Collective. */
 static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
-                         const rm_mesh *const mesh[2], const rm_zone *zone, rm_routes *out, rm_reason *reason)
+                         const rm_mesh *const mesh[2], const rm_zone *zone, const rm_slicing *slicing, rm_routes *out,
+                         rm_reason *reason)
 {
   rm_frame  zone_frame;
   rm_cuts   cuts;
@@ -53,11 +58,11 @@ static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm
     RM_TRY(rm_part_know_giants(scratch, 0, NULL, &giants));
     moved = tags;
   }
-  return rm_part_match(arena, scratch, comm, &cuts, &moved, &giants, out);
+  return rm_part_match(arena, scratch, comm, &cuts, &moved, &giants, slicing, out);
 }
 
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
-                          const rm_zone *zone, const rm_routes **out, rm_reason *reason)
+                          const rm_zone *zone, const rm_slicing *slicing, const rm_routes **out, rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new();
   rm_routes   *routes  = rm_arena_alloc(arena, 1, sizeof *routes);
@@ -65,23 +70,56 @@ remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch && routes ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(scratch && routes);
-  RM_GOTO(done, status = plan(arena, scratch, comm, frame, mesh, zone, routes, reason));
+  RM_GOTO(done, status = plan(arena, scratch, comm, frame, mesh, zone, slicing, routes, reason));
   *out = routes;
 done:
   rm_arena_drop(scratch);
   return status;
 }
 
-remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
-                          rm_reason *reason)
-{
-  rm_arena    *scratch = rm_arena_new();
-  remap_status status;
+int rm_part_rounds(const rm_routes *routes) { return routes->num; }
 
-  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh, &routes->of[mesh->side], out, reason));
-  RM_ASSERT(routes->num[mesh->side] == out->num_cells);
-  out->cell_role = routes->role[mesh->side];
+/* The cells of a side that go to a rank in any round, each once. Not collective. */
+static remap_status unite(rm_arena *arena, const rm_comm *comm, int side, const rm_routes *routes, rm_route *out)
+{
+  int64_t   most = 0, num = 0;
+  uint64_t *word;
+
+  for (int r = 0; r < routes->num; r++) most += routes->round[r].of[side].offset[comm->size];
+  RM_NEW(out->offset, arena, (int64_t)comm->size + 1);
+  RM_NEW(out->cell, arena, most);
+  RM_NEW(word, arena, most);
+  out->offset[0] = 0;
+  for (int rank = 0; rank < comm->size; rank++) {
+    int64_t n = 0;
+
+    for (int r = 0; r < routes->num; r++) {
+      const rm_route *of = &routes->round[r].of[side];
+
+      for (int64_t k = of->offset[rank]; k < of->offset[rank + 1]; k++) word[n++] = (uint64_t)of->cell[k];
+    }
+    rm_sort_words(word, n);
+    for (int64_t k = 0; k < n; k++)
+      if (k == 0 || word[k] != word[k - 1]) out->cell[num++] = (rm_lid)word[k];
+    out->offset[rank + 1] = num;
+  }
+  return REMAP_OK;
+}
+
+remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, int round,
+                          rm_piece *out, rm_reason *reason)
+{
+  const int    side    = (int)mesh->side;
+  rm_arena    *scratch = rm_arena_new();
+  rm_route     all;
+  remap_status status = scratch ? REMAP_OK : REMAP_NO_MEMORY;
+
+  if (status == REMAP_OK && round == RM_EVERY_ROUND) status = unite(scratch, comm, side, routes, &all);
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh,
+                                      round == RM_EVERY_ROUND ? &all : &routes->round[round].of[side], out, reason));
+  RM_ASSERT(round == RM_EVERY_ROUND || routes->round[round].num[side] == out->num_cells);
+  if (round != RM_EVERY_ROUND) out->cell_role = routes->round[round].role[side];
 done:
   rm_arena_drop(scratch);
   return status;
@@ -95,8 +133,8 @@ remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame 
 
   RM_TRY(rm_comm_agree(comm, part ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(part);
-  RM_TRY(rm_part_plan(arena, comm, frame, mesh, zone, &routes, reason));
-  for (int side = 0; side < 2; side++) RM_TRY(rm_part_send(arena, comm, mesh[side], routes, &part->piece[side], reason));
+  RM_TRY(rm_part_plan(arena, comm, frame, mesh, zone, &rm_one_block, &routes, reason));
+  for (int side = 0; side < 2; side++) RM_TRY(rm_part_send(arena, comm, mesh[side], routes, 0, &part->piece[side], reason));
   RM_ASSERT(rm_part_check(part) != REMAP_INTERNAL);
   *out = part;
   return REMAP_OK;

@@ -4,7 +4,11 @@
  *
  * A cell that meets a large part of the other mesh (a closed surface, a huge background cell) is a giant: it is replicated to
  * the seats of the cells it meets, and its pairs are made there. So every pair of cells is made on exactly one rank, and no
- * rank gets all cells of a mesh because of one cell of the other. */
+ * rank gets all cells of a mesh because of one cell of the other.
+ *
+ * A rank overlays its interval in one piece or in several rounds, a block of its interval in each, so that the memory of an
+ * overlay need not grow with what a rank has: a block is to a rank's interval what that is to the whole, and pairs do not
+ * depend on where they are made. */
 #ifndef RM_PART_H
 #define RM_PART_H
 
@@ -50,20 +54,33 @@ static inline bool rm_part_makes_pair(const rm_part *part, rm_lid source, rm_lid
   return ((of_source[source] & RM_ROLE_GIANT ? of_target[target] : of_source[source]) & RM_ROLE_SEATED) != 0;
 }
 
-/* Which cells go where, and what they are there. Opaque; read-only once made. */
+/* How a rank's interval is cut into blocks. */
+typedef struct rm_slicing {
+  int64_t triangles; /* that the cells seated in a block have, about, at most; a face between two cells counts half     */
+  double  repeats;   /* triangles of sources that come to a rank once more, at most, over those of all cells seated
+                        there: fewer blocks are cut where there would be more                                           */
+} rm_slicing;
+extern const rm_slicing rm_one_block;
+
+/* Which cells go where in which round, and what they are there. Opaque; read-only once made. */
 typedef struct rm_routes rm_routes;
 
 /* Choose where the cells of the zone go. Collective. Lives in arena. TOO_LARGE as below. */
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
-                          const rm_zone *zone, const rm_routes **out, rm_reason *reason);
+                          const rm_zone *zone, const rm_slicing *slicing, const rm_routes **out, rm_reason *reason);
 
-/* Send the cells of one mesh there. Collective. The routes may have been made for the same cells in another position. *out
- * lives in arena, its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later
- * rooms must not let results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
-remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, rm_piece *out,
-                          rm_reason *reason);
+/* How many rounds there are: as many on every rank. Not collective. */
+int rm_part_rounds(const rm_routes *routes);
 
-/* Both in one, for both meshes. Collective. Lives in arena. */
+/* Send the cells of one mesh there that are overlaid in a round, or in any of them, each once, if that is RM_EVERY_ROUND; then
+ * they have no roles. Collective. The routes may have been made for the same cells in another position. *out lives in arena,
+ * its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let
+ * results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
+enum { RM_EVERY_ROUND = -1 };
+remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, int round,
+                          rm_piece *out, rm_reason *reason);
+
+/* Both in one, for both meshes, in one round. Collective. Lives in arena. */
 remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, const rm_part **out, rm_reason *reason);
 /* Every invariant above; slow. Not collective. */

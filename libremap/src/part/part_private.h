@@ -25,10 +25,15 @@ typedef struct rm_route {
   rm_lid  *cell;   /* [offset[comm->size]] grouped by destination, then ascending  */
 } rm_route;
 
-struct rm_routes {
+typedef struct rm_round {
   rm_route of[2];   /* [side] */
   rm_lid   num[2];  /* [side] cells that come here                                   */
   uint8_t *role[2]; /* [side][num[side]] RM_ROLE_ of each, in the order they come in */
+} rm_round;
+
+struct rm_routes {
+  int       num;   /* the same on every rank, at least 1 */
+  rm_round *round; /* [num]                              */
 };
 
 /* Where the intervals end: rank r has the keys from key[r - 1] up to but not including key[r]; the first and the last rank's
@@ -62,7 +67,7 @@ typedef struct rm_giant {
   uint64_t key;
   int32_t  side, home_rank;
   rm_lid   cell;
-  int32_t  unused; /* no padding on the wire */
+  int32_t  num_triangles; /* as in its tag */
 } rm_giant;
 
 typedef struct rm_giants {
@@ -153,10 +158,10 @@ remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *g
 remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
                            const rm_tags *tags, const rm_giants *giants, int64_t *work[2]);
 
-/* What every rank needs, as routes of this rank's cells: targets at their seats, the source cells whose boxes they meet, and
- * giants. Collective. *out lives in arena, what is needed on the way in scratch. */
+/* What every rank needs, as routes of this rank's cells, round by round: targets at their seats, the source cells whose boxes
+ * they meet, and giants. Collective. *out lives in arena, what is needed on the way in scratch. */
 remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
-                           const rm_giants *giants, rm_routes *out);
+                           const rm_giants *giants, const rm_slicing *slicing, rm_routes *out);
 
 /* Route the source cells of the zone to every rank that has a target cell whose box they meet, targets being where `target`
  * puts them. Collective. *out lives in arena, as does what is needed on the way. */

@@ -35,13 +35,13 @@ typedef struct parcels {
   wire_cell *cell;
 } parcels;
 
-/* What the sender packs from. place_of_* tells where an entity of the mesh stands among all parcels, -1 if it is in none yet.
- * Parcels are filled in turn, so an entity is in the present one if it does not stand before that one's first. */
+/* What the sender packs from. place_of_* tells where an entity of the mesh stands in the parcel that it came into last: in the
+ * present one if that has it there. */
 typedef struct packing {
   const rm_mesh  *mesh;
   const rm_route *route;
   int             num_ranks;
-  int64_t        *place_of_node, *place_of_face, *place_of_cell;
+  rm_lid         *place_of_node, *place_of_face, *place_of_cell;
   rm_lid         *face; /* [faces of all parcels] number in the mesh */
   rm_lid         *node; /* [nodes of all parcels]                    */
   parcels         out;
@@ -53,12 +53,10 @@ static int64_t loop_length(const rm_mesh *mesh, rm_lid face)
   return mesh->face_offset[face + 1] - mesh->face_offset[face];
 }
 
-/* Places of entities of which none is in a parcel yet. */
-static remap_status new_places(rm_arena *scratch, rm_lid num, int64_t **out)
+/* Is an entity in a parcel that lists num of its kind so far? */
+static bool is_listed(const rm_lid *list, int64_t num, rm_lid place, rm_lid entity)
 {
-  RM_NEW(*out, scratch, num);
-  for (rm_lid i = 0; i < num; i++) (*out)[i] = -1;
-  return REMAP_OK;
+  return place < num && list[place] == entity;
 }
 
 static remap_status new_offsets(rm_arena *arena, int num_ranks, parcels *out)
@@ -86,8 +84,8 @@ static remap_status list_faces(rm_arena *scratch, packing *p)
       for (int64_t i = mesh->cell_face_offset[route->cell[k]]; i < mesh->cell_face_offset[route->cell[k] + 1]; i++) {
         const rm_lid f = mesh->cell_face[i];
 
-        if (p->place_of_face[f] >= p->out.face_offset[r]) continue;
-        p->place_of_face[f] = num;
+        if (is_listed(p->face + p->out.face_offset[r], num - p->out.face_offset[r], p->place_of_face[f], f)) continue;
+        p->place_of_face[f] = (rm_lid)(num - p->out.face_offset[r]);
         p->face[num++]      = f;
         num_corners += loop_length(mesh, f);
       }
@@ -100,9 +98,9 @@ static remap_status list_faces(rm_arena *scratch, packing *p)
 /* A mesh cell's number in rank r's parcel, -1 if it does not go there or is none. */
 static rm_lid cell_in_parcel(const packing *p, int r, rm_lid cell)
 {
-  const int64_t first = p->route->offset[r];
+  const int64_t first = p->route->offset[r], num = p->route->offset[r + 1] - first;
 
-  return cell >= 0 && p->place_of_cell[cell] >= first ? (rm_lid)(p->place_of_cell[cell] - first) : -1;
+  return cell >= 0 && is_listed(p->route->cell + first, num, p->place_of_cell[cell], cell) ? p->place_of_cell[cell] : -1;
 }
 
 /* Write face f to rank r's parcel, its loop turned round if only the neighbour goes there. Nodes that are new to the parcel are
@@ -124,11 +122,11 @@ static void pack_face(packing *p, int r, rm_lid f, wire_face *face, rm_lid *corn
   for (rm_lid i = 0; i < num; i++) {
     const rm_lid node = loop[owner >= 0 ? i : num - 1 - i];
 
-    if (p->place_of_node[node] < first) {
-      p->place_of_node[node] = *num_nodes;
+    if (!is_listed(p->node + first, *num_nodes - first, p->place_of_node[node], node)) {
+      p->place_of_node[node]  = (rm_lid)(*num_nodes - first);
       p->node[(*num_nodes)++] = node;
     }
-    corner[i] = (rm_lid)(p->place_of_node[node] - first);
+    corner[i] = p->place_of_node[node];
   }
 }
 
@@ -157,7 +155,7 @@ static remap_status pack_entities(rm_arena *scratch, packing *p)
 
     out->node_offset[r] = num_nodes;
     for (int64_t k = p->route->offset[r]; k < p->route->offset[r + 1]; k++) {
-      p->place_of_cell[p->route->cell[k]] = k;
+      p->place_of_cell[p->route->cell[k]] = (rm_lid)(k - p->route->offset[r]);
       pack_cell(p->mesh, p->route->cell[k], &out->cell[k]);
     }
     for (int64_t i = out->face_offset[r]; i < out->face_offset[r + 1]; i++) {
@@ -174,9 +172,9 @@ static remap_status pack_entities(rm_arena *scratch, packing *p)
 static remap_status pack(rm_arena *scratch, packing *p)
 {
   RM_TRY(new_offsets(scratch, p->num_ranks, &p->out));
-  RM_TRY(new_places(scratch, p->mesh->num_nodes, &p->place_of_node));
-  RM_TRY(new_places(scratch, p->mesh->num_faces, &p->place_of_face));
-  RM_TRY(new_places(scratch, p->mesh->num_cells, &p->place_of_cell));
+  RM_NEW0(p->place_of_node, scratch, p->mesh->num_nodes);
+  RM_NEW0(p->place_of_face, scratch, p->mesh->num_faces);
+  RM_NEW0(p->place_of_cell, scratch, p->mesh->num_cells);
   RM_TRY(list_faces(scratch, p));
   RM_TRY(pack_entities(scratch, p));
   RM_NEW(p->out.node, scratch, p->out.node_offset[p->num_ranks]);

@@ -1,0 +1,150 @@
+/* Blocks of a rank's interval, one per round, against brute force over all cells of both meshes: small meshes of several kinds,
+ * handed in in several ways. */
+#include "part/part_private.h"
+#include "pairs.h"
+#include "rt.h"
+
+/* A pair of meshes and the routes between them, cut finely. */
+typedef struct world {
+  pairs_world      in;
+  const rm_zone   *zone;
+  const rm_routes *routes;
+  rm_reason        reason;
+} world;
+
+static void open_world(world *w, int kind, int deal, rm_slicing slicing)
+{
+  *w = (world){.reason = {-1, -1, ""}};
+  pairs_open(&w->in, (pairs_kind)kind, (tm_dealing)deal);
+  RT_EQ(rm_zone_build(w->in.arena, &w->in.comm, w->in.mesh, &w->zone), REMAP_OK);
+  RT_EQ(rm_part_plan(w->in.arena, &w->in.comm, &w->in.frame, w->in.mesh, w->zone, &slicing, &w->routes, &w->reason), REMAP_OK);
+}
+
+static void for_all_worlds(void (*check)(world *w))
+{
+  for (int kind = 0; kind < pairs_num_kinds(); kind++) {
+    world w;
+
+    open_world(&w, kind, kind % PAIRS_NUM_DEALS, (rm_slicing){100, INFINITY});
+    check(&w);
+    pairs_close(&w.in);
+  }
+}
+
+static rm_part send_round(world *w, int round)
+{
+  rm_part part;
+
+  for (int side = 0; side < 2; side++)
+    RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, round, &part.piece[side], &w->reason), REMAP_OK);
+  RT_EQ(rm_part_check(&part), REMAP_OK);
+  return part;
+}
+
+/* The boxes of a piece's cells. */
+static const double (*boxes_of(world *w, const rm_piece *p))[6]
+{
+  double (*box)[6] = rm_arena_alloc(w->in.arena, p->num_cells, sizeof *box);
+
+  for (rm_lid c = 0; c < p->num_cells; c++)
+    for (int d = 0; d < 6; d++) box[c][d] = d < 3 ? INFINITY : -INFINITY;
+  for (rm_lid f = 0; f < p->num_faces; f++)
+    for (int64_t k = p->face_offset[f]; k < p->face_offset[f + 1]; k++)
+      for (int h = 0; h < 2; h++) {
+        double *own = p->face_cell[f][h] >= 0 ? box[p->face_cell[f][h]] : NULL;
+
+        for (int d = 0; d < 3 && own; d++) {
+          own[d]     = fmin(own[d], p->node_xyz[p->face_node[k]][d]);
+          own[d + 3] = fmax(own[d + 3], p->node_xyz[p->face_node[k]][d]);
+        }
+      }
+  return (const double(*)[6])box;
+}
+
+/* Pairs of meeting boxes, counted over all cells of both meshes. */
+static int64_t count_all(world *w)
+{
+  int64_t      *offset = rm_arena_alloc(w->in.arena, w->in.comm.size + 1, sizeof *offset), n[2], num = 0;
+  const double(*box[2])[6];
+  void         *all = NULL;
+
+  for (int side = 0; side < 2; side++) {
+    const rm_mesh *mesh = w->in.mesh[side];
+
+    RT_EQ(rm_comm_allgatherv(&w->in.comm, w->in.arena, mesh->cell_box, mesh->num_cells, sizeof *mesh->cell_box, offset, &all),
+          REMAP_OK);
+    box[side] = all;
+    n[side]   = offset[w->in.comm.size];
+  }
+  for (int64_t i = 0; i < n[0]; i++)
+    for (int64_t j = 0; j < n[1]; j++) num += rm_box_meets(box[0][i], box[1][j]);
+  return num;
+}
+
+static void check_pairs(world *w)
+{
+  int64_t found = 0;
+
+  for (int round = 0; round < rm_part_rounds(w->routes); round++) {
+    const rm_part part = send_round(w, round);
+    const double(*box[2])[6];
+
+    for (int side = 0; side < 2; side++) box[side] = boxes_of(w, &part.piece[side]);
+    for (rm_lid i = 0; i < part.piece[0].num_cells; i++)
+      for (rm_lid j = 0; j < part.piece[1].num_cells; j++)
+        found += rm_box_meets(box[0][i], box[1][j]) && rm_part_makes_pair(&part, i, j);
+  }
+  RT_EQ(rm_comm_sum_i64(&w->in.comm, &found, 1), REMAP_OK);
+  RT_EQ(found, count_all(w));
+}
+
+static void every_pair_of_cells_with_meeting_boxes_is_made_in_one_round_on_one_rank(void)
+{
+  for_all_worlds(check_pairs);
+}
+
+/* What comes in every round together is each cell of any round once. */
+static void check_union(world *w)
+{
+  for (int side = 0; side < 2; side++) {
+    rm_piece     all;
+    const rm_lid n    = (rm_lid)w->in.mesh[side]->num_global_cells; /* more than any rank has */
+    uint8_t     *here = rm_arena_zero(w->in.arena, (int64_t)n * w->in.comm.size, 1);
+    int64_t      num  = 0;
+
+    for (int round = 0; round < rm_part_rounds(w->routes); round++) {
+      rm_piece p;
+
+      RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, round, &p, &w->reason), REMAP_OK);
+      for (rm_lid c = 0; c < p.num_cells; c++) here[(int64_t)p.cell_home_rank[c] * n + p.cell_home[c]] = 1;
+    }
+    for (int64_t k = 0; k < (int64_t)n * w->in.comm.size; k++) num += here[k];
+    RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, RM_EVERY_ROUND, &all, &w->reason), REMAP_OK);
+    RT_EQ(all.num_cells, num);
+    for (rm_lid c = 0; c < all.num_cells; c++) RT_EQ(here[(int64_t)all.cell_home_rank[c] * n + all.cell_home[c]], 1);
+  }
+}
+
+static void all_rounds_at_once_bring_every_cell_of_any_round_once(void) { for_all_worlds(check_union); }
+
+static void sources_that_meet_everything_make_one_round(void)
+{
+  for (int kind = 0; kind < pairs_num_kinds(); kind++) {
+    world w;
+    int   rounds;
+
+    open_world(&w, kind, 0, (rm_slicing){100, INFINITY});
+    rounds = rm_part_rounds(w.routes);
+    pairs_close(&w.in);
+    open_world(&w, kind, 0, (rm_slicing){100, 0.0}); /* no triangle may come twice */
+    RT_CHECK(rm_part_rounds(w.routes) <= rounds);
+    if (kind == PAIRS_PARTLY) RT_CHECK(rounds > 1 && rm_part_rounds(w.routes) == 1);
+    pairs_close(&w.in);
+    open_world(&w, kind, 0, rm_one_block);
+    RT_EQ(rm_part_rounds(w.routes), 1);
+    pairs_close(&w.in);
+  }
+}
+
+RT_MAIN(RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_in_one_round_on_one_rank),
+        RT_CASE(all_rounds_at_once_bring_every_cell_of_any_round_once), RT_CASE(sources_that_meet_everything_make_one_round))
