@@ -542,8 +542,129 @@ static void zones_that_overlap_by_more_are_refused_by_name(void)
   close_world(&w);
 }
 
+/* ---- cells without thickness ------------------------------------------------------------------------------------- */
+
+static void to_two(double xyz[3], const void *data)
+{
+  (void)data;
+  xyz[0] *= 2;
+}
+static void to_middle(double xyz[3], const void *data)
+{
+  (void)data;
+  for (int c = 0; c < 3; c++) xyz[c] = .25 + .5 * xyz[c];
+}
+
+/* Two boxes, and a cell of two triangles without thickness on half of the face between them: on the one or the other half,
+ * before or after the boxes. The target lies in the first box. */
+static tm_mesh *half_doubled(int side, uint64_t kind)
+{
+  static const double yz[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+
+  if (side) return tm_hexahedra((int[]){1, 1, 1}, to_middle, NULL);
+  tm_mesh *flat = tm_new_(3, 2, 6, 1), *two = tm_hexahedra((int[]){2, 1, 1}, to_two, NULL);
+  for (int h = 0; h < 3; h++) {
+    const double *at = yz[(2 * (kind & 1) + (uint64_t)h) % 4];
+    flat->xyz[3 * h] = 1, flat->xyz[3 * h + 1] = at[0], flat->xyz[3 * h + 2] = at[1];
+    flat->face_node[h] = h, flat->face_node[3 + h] = 2 - h;
+  }
+  for (int f = 0; f < 2; f++) flat->face_offset[f + 1] = 3 * (f + 1), flat->neighbour[f] = -1;
+  return kind & 2 ? tm_join(two, flat) : tm_join(flat, two);
+}
+
+/* It lies on the face between a cell that is made and one that passes, whichever triangle of that it is on: all are made. */
+static void a_cell_without_thickness_on_half_a_face_is_not_there(void)
+{
+  for (uint64_t kind = 0; kind < 4; kind++) {
+    const plan p = {half_doubled, kind, REMAP_FACES_CENTRE, {UNION, 0, 0, 1}, false, false};
+    world      w;
+
+    look(&p);
+    open_world(&w, MPI_COMM_SELF, &p);
+    RT_EQ(w.v.num_cells, 3);
+    close_world(&w);
+  }
+}
+
+/* ---- refusals ---------------------------------------------------------------------------------------------------- */
+
+static void to_seven(double xyz[3], const void *data)
+{
+  (void)data;
+  xyz[0] += 7;
+}
+static void turn_and_widen(double xyz[3], const void *data)
+{
+  const double x = xyz[0], y = xyz[1];
+
+  (void)data;
+  xyz[0] = x - y, xyz[1] = x + y;
+}
+static void pull_a_node_out(double xyz[3], const void *data)
+{
+  (void)data;
+  if (xyz[0] == .5 && xyz[1] == .5 && xyz[2] == .5) xyz[0] = 1.2, xyz[1] = 1.3, xyz[2] = 1.1;
+}
+static void around(double xyz[3], const void *data)
+{
+  (void)data;
+  for (int c = 0; c < 3; c++) xyz[c] = 4 * xyz[c] - 2;
+}
+static tm_mesh *cube(int n, tm_map map) { return tm_hexahedra((int[]){n, n, n}, map, NULL); }
+
+static tm_mesh *one_zone(tm_mesh *m)
+{
+  free(m->zone_offset), free(m->zone_name);
+  m->zone_offset    = NULL;
+  m->zone_name      = NULL;
+  m->view.num_zones = 0;
+  tm_view_(m);
+  return m;
+}
+
+/* Meshes that no supermesh is made of, and what is said about them. */
+static tm_mesh *refused(int side, uint64_t kind)
+{
+  switch (kind) {
+    case 1: return side ? cube(1, around) : tm_join(cube(1, NULL), cube(1, NULL));
+    case 2: return side ? cube(1, NULL) : one_zone(tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -.3, NULL, NULL));
+    case 3: return side ? cube(3, NULL) : cube(2, pull_a_node_out);
+    case 4: return side ? cube(1, around) : one_zone(tm_join(cube(1, NULL), cube(1, turn_and_widen)));
+    case 5: return side ? cube(1, around) : cube(2, pull_a_node_out);
+    case 6: return side ? cube(2, around) : tm_join(cube(1, to_seven), tm_join(cube(2, NULL), cube(1, to_seven)));
+    default: return side ? tm_join(cube(1, to_seven), tm_join(cube(2, NULL), cube(1, to_seven))) : cube(2, around);
+  }
+}
+
+/* Cells once more that meet nothing are noticed when faces are numbered; on several ranks, when halves of faces are paired. */
+static void every_refusal_names_a_cell(void)
+{
+  static const struct {
+    const char *mesh, *text;
+  } say[] = {{"source mesh: ", "this cell overlaps another of its mesh"},
+             {"target mesh: ", "a face of this cell meets cells of the other mesh that overlap"},
+             {"t mesh: cell ", "a face of this cell meets cells of the other mesh that overlap"},
+             {"source mesh: ", "the faces around an edge of this cell do not bound cells"},
+             {"source mesh: cell ", "a part of this cell is inverted"},
+             {"source mesh: ", "a part of this cell lies on a part of another"},
+             {"target mesh: ", "a part of this cell lies on a part of another"}};
+
+  for (uint64_t kind = 1; kind <= 7; kind++) {
+    const plan p = {refused, kind, REMAP_FACES_CENTRE, {UNION, 0, 0, 1}, false, true};
+    world      w;
+
+    open_world(&w, MPI_COMM_WORLD, &p);
+    RT_EQ(w.status, REMAP_BAD_MESH);
+    const char *message = remap_message(w.ctx);
+    RT_CHECK(strstr(message, say[kind - 1].mesh) && strstr(message, ": cell ") && strstr(message, say[kind - 1].text));
+    if (w.status != REMAP_BAD_MESH || !strstr(message, say[kind - 1].text)) printf("# kind %d: %s\n", (int)kind, message);
+    close_world(&w);
+  }
+}
+
 RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothing_pass_through),
         RT_CASE(meshes_that_touch_in_every_way_are_the_same_on_any_ranks), RT_CASE(pieces_of_warped_faces_come_together),
         RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut),
         RT_CASE(zones_that_touch_need_no_matching_faces), RT_CASE(zones_that_overlap_by_rounding_count_once),
-        RT_CASE(zones_that_overlap_by_more_are_refused_by_name))
+        RT_CASE(zones_that_overlap_by_more_are_refused_by_name),
+        RT_CASE(a_cell_without_thickness_on_half_a_face_is_not_there), RT_CASE(every_refusal_names_a_cell))

@@ -80,6 +80,13 @@ static inline void super_check_volumes(const super *s)
   for (int side = 0; side < 2; side++) free(row[side]);
 }
 
+/* The face of the piece that a triangle is part of, the lower one if it is of two. */
+static inline rm_lid super_face_of_triangle_(const rm_trimesh *mesh, rm_lid t)
+{
+  const rm_lid *f = mesh->triangle_face[t];
+  return f[0] < 0 || (f[1] >= 0 && f[1] < f[0]) ? f[1] : f[0];
+}
+
 /* The faces that came from a face of an operand cover it, once. */
 static inline void super_faces_are_covered_(const super *s)
 {
@@ -92,13 +99,13 @@ static inline void super_faces_are_covered_(const super *s)
       const rm_lid t = rm_cells_triangle(s->cells, f, side);
       double       a[3];
       super_area_vector_(s->cells, f, a);
-      if (t >= 0) sum[rm_face_of_triangle(m, t)] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+      if (t >= 0) sum[super_face_of_triangle_(m, t)] += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     }
     for (rm_lid t = 0; t < m->num_triangles; t++) {
       const double *v = m->normal[t];
       if (t && !memcmp(m->triangle[t], m->triangle[t - 1], sizeof *m->triangle))
         continue; /* counts as the first that lies there */
-      area[rm_face_of_triangle(m, t)] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      area[super_face_of_triangle_(m, t)] += .5 * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     }
     for (rm_lid f = 0; f < n; f++)
       if (area[f] > 0) worst = fmax(worst, fabs(sum[f] - area[f]) / area[f]);

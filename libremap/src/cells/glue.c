@@ -182,10 +182,21 @@ static remap_status join_by_angle(work *w, rm_lid p, const rm_arc *arc, rm_lid n
 
 /* ---- between pieces of a face ------------------------------------------------------------------------------------ */
 
+/* True if some face has a part in both triangles, or in copies of them; two of -1 are alike. */
 static bool same_face(const rm_limit *l, int side, rm_lid a, rm_lid b)
 {
-  if (a < 0 || b < 0) return a == b;
-  return rm_face_of_triangle(l->mesh[side], a) == rm_face_of_triangle(l->mesh[side], b);
+  const rm_trimesh *m    = l->mesh[side];
+  const rm_lid     *copy = l->first_copy[side];
+
+  if (a == b) return true;
+  if (a < 0 || b < 0) return false;
+  for (rm_lid x = a; x < m->num_triangles && copy[x] == a; x++)
+    for (rm_lid y = b; y < m->num_triangles && copy[y] == b; y++)
+      for (int h = 0; h < 4; h++) {
+        const rm_lid f = m->triangle_face[x][h & 1];
+        if (f >= 0 && f == m->triangle_face[y][h >> 1]) return true;
+      }
+  return false;
 }
 
 static bool coplanar(const rm_limit *l, int side, rm_lid a, rm_lid b)

@@ -82,13 +82,6 @@ typedef struct rm_trimesh {
   const rm_boxtree *odd_tree;           /* over odd_box; NULL if there are none                                  */
 } rm_trimesh;
 
-/* The face of the piece that a triangle is part of, the lower one if it is of two. */
-static inline rm_lid rm_face_of_triangle(const rm_trimesh *mesh, rm_lid t)
-{
-  const rm_lid *f = mesh->triangle_face[t];
-  return f[0] < 0 || (f[1] >= 0 && f[1] < f[0]) ? f[1] : f[0];
-}
-
 /* 2 * (triangle that the facet of t is called by) + (1 if their normals are opposite). */
 static inline rm_lid rm_facet_of(const rm_trimesh *mesh, rm_lid t) { return mesh->facet ? mesh->facet[t] : 2 * t; }
 

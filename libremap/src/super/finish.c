@@ -17,11 +17,37 @@ typedef struct work {
   rm_lid              *new_cell; /* [cells of the soup]                                        */
 } work;
 
-static remap_status tangled(const work *w)
+/* How a refusal names a cell of the soup: twice the number of its ancestor, and the side that has it. */
+static int64_t name_of(const rm_soup_cell *cell)
 {
-  return rm_fail(REMAP_BAD_MESH, w->reason, -1, -1,
-                 "parts of the supermesh lie on each other: cells of one mesh overlap or are inverted; a supermesh needs cells "
-                 "that do not");
+  const int side = cell->ancestor[0] >= 0 ? 0 : 1;
+  return 2 * cell->ancestor[side] + side;
+}
+
+static remap_status tangled(const work *w, int64_t name)
+{
+  return rm_fail(REMAP_BAD_MESH, w->reason, (int)(name & 1), name / 2,
+                 "a part of this cell lies on a part of another: cells of one mesh overlap, are there twice or are inverted; a "
+                 "supermesh needs cells that do not and are not");
+}
+
+/* The cell that has the soup's face f on its owner's side. */
+static int64_t name_at_face(const work *w, int64_t f) { return name_of(&w->soup->cell[w->soup->face[f].cell[0]]); }
+
+/* A cell that has the soup's vertex i. */
+static int64_t name_at_vertex(const work *w, int64_t i)
+{
+  const rm_soup *s = w->soup;
+  int64_t        f = 0;
+
+  while (f < s->num_faces) {
+    int64_t k = s->face[f].first;
+    while (k < s->face[f + 1].first && s->loop[k] != i) k++;
+    if (k < s->face[f + 1].first) break;
+    f++;
+  }
+  RM_ASSERT(f < s->num_faces); /* no vertex is without a face */
+  return name_at_face(w, f);
 }
 
 /* ---- vertices ---------------------------------------------------------------------------------------------------- */
@@ -82,7 +108,8 @@ static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number
   rm_sort_keyed(key, spare, s->num_vertices);
   for (int64_t i = 0; i < s->num_vertices; i++) {
     const bool again = i > 0 && key[i].key == key[i - 1].key;
-    if (again && key[i].item < s->num_made) return tangled(w); /* the sort is stable: so is the one before */
+    if (again && key[i].item < s->num_made) /* the sort is stable: so is the one before */
+      return tangled(w, name_at_vertex(w, key[i].item));
     n += !again;
     node_of[key[i].item] = (rm_lid)(n - 1);
   }
@@ -172,7 +199,7 @@ static remap_status join_faces(work *w, rm_arena *passing)
     const rm_soup_face *x = &s->face[w->face_at[n - 1]], *y = &s->face[key[f].item];
     if (w->face_twin[n - 1] >= 0 || x->cell[1] >= 0 || y->cell[1] >= 0 ||
         walk_of(s, x - s->face, &a) == walk_of(s, y - s->face, &b))
-      return tangled(w);
+      return tangled(w, name_at_face(w, y - s->face));
     w->face_twin[n - 1] = (rm_lid)key[f].item;
   }
   w->v.num_faces = n;
@@ -312,6 +339,8 @@ static remap_status make_faces(work *w)
 /* A face that has one cell on a rank, on its way to the rank that looks after its number. */
 typedef struct half {
   int64_t face, cell;
+  int64_t name; /* name_of the cell                       */
+  int64_t way;  /* in which the face runs there, as walk_of */
 } half;
 
 static int keeper_of(int64_t face, int size) { return (int)((uint64_t)face % (uint64_t)size); }
@@ -330,8 +359,10 @@ static remap_status collect_halves(const work *w, rm_arena *passing, int64_t **o
   RM_NEW(*face, passing, num);
   for (int64_t f = 0; f < w->v.num_faces; f++) {
     if (w->v.face_neighbour[f] >= 0) continue;
-    const int64_t at = next[keeper_of(w->v.face_global[f], size) + 1]++;
-    (*list)[at]      = (half){w->v.face_global[f], w->v.cell_global[w->v.face_owner[f]]};
+    const int64_t at = next[keeper_of(w->v.face_global[f], size) + 1]++, made = w->face_at[f];
+    int64_t       first;
+    (*list)[at] = (half){w->v.face_global[f], w->v.cell_global[w->v.face_owner[f]], name_at_face(w, made),
+                         walk_of(w->soup, made, &first)};
     (*face)[at]      = (rm_lid)f;
   }
   *offset = next; /* each rank's end is the next one's begin */
@@ -351,7 +382,8 @@ static remap_status pair_halves(const work *w, rm_arena *passing, int64_t n, con
   rm_sort_keyed(key, spare, n);
   for (int64_t k = 0, next; k < n; k = next) {
     for (next = k + 1; next < n && key[next].key == key[k].key;) next++;
-    if (next > k + 2) return tangled(w);
+    if (next > k + 2 || (next == k + 2 && list[key[k].item].way == list[key[k + 1].item].way))
+      return tangled(w, list[key[k].item].name);
     for (int64_t i = k; i < next; i++) other[key[i].item] = next == k + 2 ? list[key[i == k ? k + 1 : k].item].cell : -1;
   }
   *out = other;

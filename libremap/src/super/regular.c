@@ -27,20 +27,26 @@ static remap_status check_flat(rm_arena *passing, const rm_trimesh *m, const uin
   return REMAP_OK;
 }
 
-/* Faces between made cells and those that pass are of triangles that no other lies on. */
-static void check_stacks(const rm_trimesh *m, const rm_cells *cells, int side, const uint8_t *flag, bool *regular)
+/* No triangle on which others lie has cells that are made and cells that pass around it. Copies of a triangle stand side by
+ * side; which of a face's triangles has them does not matter. */
+static void check_stacks(const rm_trimesh *m, const uint8_t *flag, bool *regular)
 {
-  for (rm_lid f = 0; f < cells->num_faces; f++) {
-    const rm_lid  t      = rm_cells_triangle(cells, f, side);
-    const rm_lid *beyond = rm_cells_beyond(cells, f);
+  for (rm_lid t = 0, last; t < m->num_triangles; t = last) {
+    bool made = false, passes = false;
 
-    if (t < 0 || !beyond || beyond[side] < 0 || (flag[beyond[side]] & RM_COVER_MET)) continue;
-    if (t + 1 < m->num_triangles && !memcmp(m->triangle[t + 1], m->triangle[t], sizeof *m->triangle)) *regular = false;
+    for (last = t; last < m->num_triangles && (last == t || !memcmp(m->triangle[last], m->triangle[t], sizeof *m->triangle));
+         last++)
+      for (int h = 0; h < 2; h++) {
+        const rm_lid c = m->side[last][h];
+        made           = made || (c >= 0 && flag[c] & RM_COVER_MET);
+        passes         = passes || (c >= 0 && !(flag[c] & RM_COVER_MET));
+      }
+    if (last > t + 1 && made && passes) *regular = false;
   }
 }
 
 remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const given[2],
-                                 const rm_trimesh *const mesh[2], const rm_cells *cells, bool *regular)
+                                 const rm_trimesh *const mesh[2], bool *regular)
 {
   rm_arena    *passing = rm_arena_new();
   remap_status status  = passing ? REMAP_OK : REMAP_NO_MEMORY;
@@ -49,7 +55,7 @@ remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover,
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     if (!rm_super_passes(job, side)) continue;
     if (given[side] != mesh[side]) status = check_flat(passing, given[side], cover->flag[side], regular);
-    check_stacks(mesh[side], cells, side, cover->flag[side], regular);
+    check_stacks(mesh[side], cover->flag[side], regular);
   }
   rm_arena_drop(passing);
   return status;

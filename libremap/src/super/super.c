@@ -86,7 +86,7 @@ static remap_status make_cells(work *w, bool *regular, rm_reason *reason)
   w->figures.seconds_cells += w->cells->seconds_glue;
   w->figures.seconds_faces += w->cells->seconds_faces;
   RM_TRY(tell(w, "cells of the supermesh", 1));
-  return rm_super_is_regular(w->job, w->cover, given, w->mesh, w->cells, regular);
+  return rm_super_is_regular(w->job, w->cover, given, w->mesh, regular);
 }
 
 static void drop_passing(work *w)

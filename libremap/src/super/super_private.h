@@ -84,7 +84,7 @@ static inline bool rm_super_passes(const rm_super_job *job, int side)
 /* *regular is false if what was made does not fit cells that pass, which then have to be made too. given: the meshes as they
  * were triangulated; mesh: as they were overlaid. Not collective. */
 remap_status rm_super_is_regular(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const given[2],
-                                 const rm_trimesh *const mesh[2], const rm_cells *cells, bool *regular);
+                                 const rm_trimesh *const mesh[2], bool *regular);
 
 /* Room for what rm_super_pass adds, about. Not collective. */
 remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup);
