@@ -6,7 +6,6 @@
 
 #include <progress.h>
 
-#include <signal.h>
 #include <string.h>
 
 #define PROGRESS_SECONDS 8.0 /* between lines */
@@ -125,10 +124,8 @@ int main(int argc, char **argv)
   job         j = {.comm = MPI_COMM_WORLD};
   cli_failure why;
   cli_exit    code;
-  int         threads;
 
-  signal(SIGXFSZ, SIG_IGN);                                     /* a file that may not grow is a write error like others */
-  MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &threads); /* the other thread only prints */
+  cli_begin(&argc, &argv);
   MPI_Comm_rank(j.comm, &j.rank);
   j.begin = MPI_Wtime();
   code    = bool_options_parse(argc, argv, &j.options, &why);
@@ -144,7 +141,5 @@ int main(int argc, char **argv)
     remap_destroy(&j.ctx);
     for (int side = 0; side < 2; side++) bool_operand_close(&j.operand[side]);
   }
-  if (code != CLI_DONE && j.rank == 0) fprintf(stderr, "remap-boolean: %s\n", why.text);
-  MPI_Finalize();
-  return (int)code;
+  return cli_end("remap-boolean", code, &why);
 }

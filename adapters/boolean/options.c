@@ -22,19 +22,9 @@
   X(VERSION, 0, "version", NULL, AT(version), "print the version")                                                             \
   X(HELP, 'h', "help", NULL, AT(help), "print this text")
 
-enum option_key {
-  FIRST_KEY = 256, /* above every letter, so that getopt's own answers cannot be mistaken */
-#define X(key, letter, name, argument, at, text) KEY_##key,
-  OPTION_LIST(X)
-#undef X
-      END_KEY
-};
+enum option_key { BEFORE_KEYS = CLI_FIRST_KEY, OPTION_LIST(CLI_KEY) BEHIND_KEYS };
 
-static const cli_row rows[] = {
-#define X(key, letter, name, argument, at, text) {KEY_##key, letter, name, argument, at, text},
-    OPTION_LIST(X)
-#undef X
-};
+static const cli_row rows[] = {OPTION_LIST(CLI_ROW)};
 
 static cli_exit parse_value(void *options, const cli_row *row, const char *argument, cli_failure *why);
 static cli_exit add_word(void *options, const char *text, cli_failure *why);

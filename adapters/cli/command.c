@@ -2,11 +2,32 @@
 #include "command.h"
 
 #include <getopt.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+
+/* ---- the whole ----------------------------------------------------------------------------------------------------- */
+
+void cli_begin(int *argc, char ***argv)
+{
+  int threads;
+
+  signal(SIGXFSZ, SIG_IGN);
+  MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &threads);
+}
+
+int cli_end(const char *name, cli_exit status, const cli_failure *why)
+{
+  int rank;
+
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (status != CLI_DONE && rank == 0) fprintf(stderr, "%s: %s\n", name, why->text);
+  MPI_Finalize();
+  return (int)status;
+}
 
 /* ---- failures ------------------------------------------------------------------------------------------------------ */
 

@@ -23,6 +23,12 @@ typedef struct cli_row {
 
 #define CLI_OTHER SIZE_MAX
 
+/** From a list X(KEY, letter, name, argument, at, text) of all options their keys, in an enum that begins above every letter, so
+ *  that getopt's own answers cannot be mistaken, and their rows. */
+enum { CLI_FIRST_KEY = 256 };
+#define CLI_KEY(key, letter, name, argument, at, text) KEY_##key,
+#define CLI_ROW(key, letter, name, argument, at, text) {KEY_##key, letter, name, argument, at, text},
+
 /** A command line: its options, and who hears of the rest. */
 typedef struct cli_command {
   const char    *name; /**< of the command, for messages */
@@ -42,6 +48,12 @@ void cli_command_help(const cli_command *command, int width, FILE *out);
 
 /** The whole of a text as a number; false if it is none. Not collective. */
 int cli_number(const char *text, double *value);
+
+/** Begin a command: MPI with one thread beside, which only prints; a file that may not grow is a write error like others. */
+void cli_begin(int *argc, char ***argv);
+
+/** End it: why a failure happened, in one line on standard error of rank 0. What main returns. Collective. */
+int cli_end(const char *name, cli_exit status, const cli_failure *why);
 
 /** The greatest of the ranks' statuses and the text of the lowest rank that has it. Collective. */
 cli_exit cli_agree_on(MPI_Comm comm, cli_exit mine, cli_failure *why);

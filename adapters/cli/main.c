@@ -6,7 +6,6 @@
 #include "job.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -299,10 +298,8 @@ int main(int argc, char **argv)
   cli_job     j = {.comm = MPI_COMM_WORLD};
   cli_failure why;
   cli_exit    status;
-  int         threads;
 
-  signal(SIGXFSZ, SIG_IGN);                                     /* a file that may not grow is a write error like others */
-  MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &threads); /* the other thread only prints */
+  cli_begin(&argc, &argv);
   MPI_Comm_rank(j.comm, &j.rank);
   j.begin = MPI_Wtime();
   status  = cli_options_parse(argc, argv, &j.options, &why);
@@ -314,7 +311,5 @@ int main(int argc, char **argv)
     status = run(&j, &why);
     end(&j);
   }
-  if (status != CLI_DONE && j.rank == 0) fprintf(stderr, "remap: %s\n", why.text);
-  MPI_Finalize();
-  return (int)status;
+  return cli_end("remap", status, &why);
 }
