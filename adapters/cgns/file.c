@@ -135,6 +135,7 @@ static rcgns_status read_tree(rcgns_file *file, rcgns_message *message)
   if (!is_h5 && !rc_adf_is_file(path))
     return rc_fail(message, RCGNS_IO, "%s: it is neither an HDF5 nor an ADF file: give a CGNS file", path);
   source = rc_tree_source(&file->tree, path, !is_h5);
+  if (source == -1) return rc_no_memory(message);
   if (source < 0) return rc_fail(message, RCGNS_IO, "%s: %s", path, strerror(errno));
   RC_TRY(is_h5 ? rc_h5_walk(&file->tree, message) : rc_adf_walk(&file->tree, message));
   if (rc_tree_find(&file->tree, 0, -1, "CGNSBase_t", NULL) < 0)

@@ -25,6 +25,7 @@ typedef struct walker {
   rc_tree       *tree;
   rc_array       file; /* hid_t for each source of the tree */
   rcgns_message *message;
+  bool           no_memory; /* somewhere on the way: then a link that leads nowhere need not be dead */
 } walker;
 
 static hid_t file_of(const walker *w, int source) { return ((hid_t *)w->file.item)[source]; }
@@ -148,7 +149,7 @@ static rcgns_status payload(walker *w, hid_t group, rc_node *n)
 }
 
 /* A small dataset of characters in a group; the caller frees; NULL if there is none. */
-static char *read_text(hid_t group, const char *name)
+static char *read_text(walker *w, hid_t group, const char *name)
 {
   hid_t   data, space;
   char   *text = NULL;
@@ -157,8 +158,8 @@ static char *read_text(hid_t group, const char *name)
   if (H5Lexists(group, name, H5P_DEFAULT) <= 0 || (data = H5Dopen2(group, name, H5P_DEFAULT)) < 0) return NULL;
   space = H5Dget_space(data);
   count = (int64_t)H5Sget_simple_extent_npoints(space);
-  if (count > 0 && count < 1 << 16 && (text = calloc((size_t)count + 1, 1)) &&
-      H5Dread(data, H5T_NATIVE_SCHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
+  if (count > 0 && count < 1 << 16 && !(text = calloc((size_t)count + 1, 1))) w->no_memory = true;
+  if (text && H5Dread(data, H5T_NATIVE_SCHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
     free(text);
     text = NULL;
   }
@@ -177,6 +178,7 @@ static int source_at(walker *w, const char *path)
     if (!strcmp(path_of(w, i), path)) return i;
   if (!rc_h5_is_file(path) || (file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT)) < 0) return -1;
   source = rc_reserve(&w->file, 1, sizeof file) ? rc_tree_source(w->tree, path, false) : -1;
+  if (source == -1) w->no_memory = true;
   if (source < 0) {
     H5Fclose(file);
     return -1;
@@ -186,7 +188,7 @@ static int source_at(walker *w, const char *path)
 }
 
 /* A linked file's path: relative ones begin at the folder of the file with the link. The caller frees. */
-static char *linked_path(const walker *w, int from, const char *file)
+static char *linked_path(walker *w, int from, const char *file)
 {
   const char  *here   = path_of(w, from);
   const char  *slash  = strrchr(here, '/');
@@ -195,6 +197,7 @@ static char *linked_path(const walker *w, int from, const char *file)
   char        *path   = malloc(size);
 
   if (path) snprintf(path, size, "%.*s%s", folder, here, file);
+  else w->no_memory = true;
   return path;
 }
 
@@ -203,8 +206,8 @@ static hid_t open_path(walker *w, int *source, const char *path, char **found, i
 /* Where a link group leads: the group, open, and its file and path there; -1: nowhere. */
 static hid_t follow(walker *w, hid_t group, int *source, char **found, int depth)
 {
-  char *file = read_text(group, " file");
-  char *path = read_text(group, " path");
+  char *file = read_text(w, group, " file");
+  char *path = read_text(w, group, " path");
   hid_t to   = -1;
   int   at   = *source;
 
@@ -259,6 +262,7 @@ static hid_t open_path(walker *w, int *source, const char *path, char **found, i
     path += n;
   }
   if (group >= 0 && !at) {
+    w->no_memory = true;
     H5Gclose(group);
     group = -1;
   }
@@ -271,12 +275,14 @@ static hid_t open_path(walker *w, int *source, const char *path, char **found, i
 }
 
 /* Is this place already open above the node? Then a link to it has no end. */
-static bool is_above(const walker *w, int64_t node, int source, const char *path)
+static bool is_above(walker *w, int64_t node, int source, const char *path)
 {
   for (; node >= 0; node = rc_node_at(w->tree, node)->parent) {
-    char *mine = rc_node_at(w->tree, node)->file == source ? rc_tree_path(w->tree, node) : NULL;
-    bool  same = mine && !strcmp(mine, *path ? path : "/");
+    const bool here = rc_node_at(w->tree, node)->file == source;
+    char      *mine = here ? rc_tree_path(w->tree, node) : NULL;
+    const bool same = mine && !strcmp(mine, *path ? path : "/");
 
+    if (here && !mine) w->no_memory = true;
     free(mine);
     if (same) return true;
   }
@@ -285,17 +291,22 @@ static bool is_above(const walker *w, int64_t node, int source, const char *path
 
 typedef struct names {
   rc_array name; /* char * */
+  bool     no_memory;
 } names;
 
 static herr_t collect(hid_t group, const char *name, const H5L_info_t *info, void *user)
 {
-  rc_array *list = &((names *)user)->name;
+  names    *mine = user;
+  rc_array *list = &mine->name;
   char     *copy;
 
   (void)group;
   (void)info;
   if (*name == ' ') return 0;
-  if (!rc_reserve(list, 1, sizeof copy) || !(copy = strdup(name))) return -1;
+  if (!rc_reserve(list, 1, sizeof copy) || !(copy = strdup(name))) {
+    mine->no_memory = true;
+    return -1;
+  }
   ((char **)list->item)[list->count++] = copy;
   return 0;
 }
@@ -305,7 +316,7 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
 /* The children in the order of their making, or by name where the file does not keep it. */
 static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source, int depth)
 {
-  names        list   = {{.item = NULL}};
+  names        list   = {.no_memory = false};
   unsigned     flags  = 0;
   hid_t        made   = H5Gget_create_plist(group);
   rcgns_status status = RCGNS_OK;
@@ -314,8 +325,9 @@ static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source
   H5Pclose(made);
   if (H5Literate(group, flags & H5P_CRT_ORDER_TRACKED ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME, H5_ITER_INC, NULL, collect, &list) <
       0)
-    status = rc_fail(w->message, RCGNS_IO, "%s: cannot list the children of node %s: is the file complete?", path_of(w, source),
-                     rc_node_at(w->tree, me)->name);
+    status = list.no_memory ? rc_no_memory(w->message)
+                            : rc_fail(w->message, RCGNS_IO, "%s: cannot list the children of node %s: is the file complete?",
+                                      path_of(w, source), rc_node_at(w->tree, me)->name);
   for (int64_t i = 0; i < list.name.count; i++) {
     char   *name  = ((char **)list.name.item)[i];
     rc_node n     = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
@@ -343,8 +355,8 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
     return rc_fail(w->message, RCGNS_IO, "%s: its tree has no end: does a link lead back to itself?", path_of(w, 0));
   read_attribute(group, "type", n.type, sizeof n.type);
   if (!strcmp(n.type, "LK")) {
-    file        = read_text(group, " file");
-    path        = read_text(group, " path");
+    file        = read_text(w, group, " file");
+    path        = read_text(w, group, " path");
     n.is_link   = true;
     n.link_file = rc_tree_store(w->tree, file ? file : "", file ? (int64_t)strlen(file) + 1 : 1);
     n.link_path = rc_tree_store(w->tree, path ? path : "", path ? (int64_t)strlen(path) + 1 : 1);
@@ -355,9 +367,10 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
       read_attribute(at, "type", n.type, sizeof n.type);
       n.anchor = rc_tree_store(w->tree, found, (int64_t)strlen(found) + 1);
     }
+    if (w->no_memory || n.link_file < 0 || n.link_path < 0 || (at >= 0 && n.anchor < 0)) status = rc_no_memory(w->message);
   }
   if (!n.is_dead) read_attribute(at, "label", n.label, sizeof n.label);
-  if (!n.is_dead && parent >= 0) status = payload(w, at, &n);
+  if (status == RCGNS_OK && !n.is_dead && parent >= 0) status = payload(w, at, &n);
   if (status == RCGNS_OK && (me = rc_tree_add(w->tree, parent, &n)) < 0) status = rc_no_memory(w->message);
   if (status == RCGNS_OK && !n.is_dead) status = walk_children(w, at, me, n.file, depth + 1);
   if (at != group && at >= 0) H5Gclose(at);

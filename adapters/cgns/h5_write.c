@@ -62,7 +62,7 @@ static char *path_of(const rc_plan *plan, int64_t i)
 /* Property lists and an error flag for the making of one file. */
 typedef struct maker {
   hid_t file, group, small, large; /* lists: groups, arrays written at once, arrays filled later */
-  bool  ok;
+  bool  ok, no_memory;
 } maker;
 
 static void text_attribute(maker *m, hid_t group, const char *name, const char *value, size_t size)
@@ -141,8 +141,9 @@ static void make_entry(maker *m, const rc_plan *plan, int64_t i)
   char           *path  = path_of(plan, i);
   const hid_t     group = path ? H5Gcreate2(m->file, path, H5P_DEFAULT, m->group, H5P_DEFAULT) : -1;
 
+  m->no_memory = !path;
+  m->ok        = m->ok && group >= 0;
   free(path);
-  m->ok = m->ok && group >= 0;
   if (!m->ok) return;
   node_attributes(m, group, e->name, e->label, e->content == RC_LINK ? "LK" : e->content == RC_EMPTY ? "MT" : e->type);
   flags_attribute(m, group);
@@ -201,12 +202,12 @@ static int ask_space(const char *path, int64_t bytes)
   return 0;
 }
 
-/* Everything but the values, into a new file whose space is claimed. An error number, or 0; EIO is HDF5's. */
+/* Everything but the values, into a new file whose space is claimed. An error number, or 0; EIO is of HDF5, ENOMEM of here. */
 static int make_file(const char *path, const rc_plan *plan)
 {
   const unsigned order  = H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED;
   const hid_t    access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
-  maker          m    = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true};
+  maker          m    = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true, false};
   hsize_t        size = 0;
   int            error;
 
@@ -234,7 +235,7 @@ static int make_file(const char *path, const rc_plan *plan)
   H5Pclose(m.group);
   H5Pclose(create);
   H5Pclose(access);
-  return error ? error : m.ok ? 0 : EIO;
+  return error ? error : m.ok ? 0 : m.no_memory ? ENOMEM : EIO;
 }
 
 rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message *message)
@@ -242,6 +243,7 @@ rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message
   int error = ask_space(path, most_bytes(plan));
 
   if (!error) QUIETLY(error = make_file(path, plan));
+  if (error == ENOMEM) return rc_no_memory(message);
   return error ? rc_fail(message, RCGNS_IO, "cannot be written: %s", strerror(error)) : RCGNS_OK;
 }
 
@@ -368,7 +370,8 @@ static rcgns_status fill_entry(rcgns_file *file, hid_t out, const rc_plan *plan,
     sprintf(name, "%s/ data", path);
     data = H5Dopen2(out, name, H5P_DEFAULT);
   }
-  status = write_failed(file, data >= 0, e->name, message);
+  status = rc_agree(file->comm, name ? RCGNS_OK : rc_no_memory(message), message);
+  if (status == RCGNS_OK) status = write_failed(file, data >= 0, e->name, message);
   if (status == RCGNS_OK)
     status = e->content == RC_COPY    ? copy_array(file, data, e, message)
              : e->content == RC_SLICE ? write_slice(file, data, e, message)
