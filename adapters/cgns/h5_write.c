@@ -207,7 +207,8 @@ static int make_file(const char *path, const rc_plan *plan)
 {
   const unsigned order  = H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED;
   const hid_t    access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
-  maker          m    = {-1, H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE), true, false};
+  maker          m    = {-1,   H5Pcreate(H5P_GROUP_CREATE), H5Pcreate(H5P_DATASET_CREATE), H5Pcreate(H5P_DATASET_CREATE),
+                         true, false};
   hsize_t        size = 0;
   int            error;
 
