@@ -29,6 +29,12 @@ static tm_mesh *make_with_giants(int side, uint64_t seed)
   }
 }
 
+static void above(double xyz[3], const void *data)
+{
+  (void)data;
+  xyz[2] += 1;
+}
+
 static tm_mesh *make(int side, uint64_t seed)
 {
   static const double away[12] = {1, 0, 0, .25, 0, 1, 0, .2, 0, 0, 1, .3};
@@ -36,10 +42,11 @@ static tm_mesh *make(int side, uint64_t seed)
   tm_mesh            *m;
 
   if (seed >= GIANTS) return make_with_giants(side, seed);
-  switch ((seed + (uint64_t)side) % 4) {
+  switch ((seed + (uint64_t)side) % 5) {
     case 0: m = tm_tetrahedra((int[]){3, 3, 3}, tm_warp, &warp); break;
     case 1: m = tm_refined((int[]){3, 4, 3}, tm_checkered, tm_warp, &warp); break;
     case 2: m = tm_dual((int[]){3, 3, 4}, tm_warp, &warp); break;
+    case 3: m = tm_join(tm_hexahedra((int[]){5, 4, 2}, NULL, NULL), tm_prisms((int[]){5, 4, 2}, above, NULL)); break;
     default: m = tm_hexahedra((int[]){5, 4, 6}, NULL, NULL); break; /* aligned with nothing, coplanar with itself */
   }
   if (side) tm_move(m, tm_affine, away);

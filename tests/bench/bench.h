@@ -125,25 +125,6 @@ static inline tm_mesh *bench_placed_(tm_mesh *mesh, double angle, double scale)
   return mesh;
 }
 
-/* Cubes of edge 2 BENCH_EDGE on the lattice, n of them along each side about the origin; turned by the rotation of quaternion
- * (13, 2, 1, 3), which is rational with denominator BENCH_EDGE, and moved. All coordinates are exact. */
-enum { BENCH_EDGE = 13 * 13 + 2 * 2 + 1 + 3 * 3 };
-typedef struct bench_cubes_ {
-  int  n;
-  bool turned;
-} bench_cubes_;
-static inline void bench_cube_(double xyz[3], const void *data)
-{
-  static const double turn[3][3] = {{163, -74, 38}, {82, 157, -46}, {-14, 58, 173}};
-  static const double move[3]    = {37 + 311 / 1024., 101 + 717 / 1024., -59 - 103 / 1024.};
-  const bench_cubes_ *cubes      = data;
-  double              at[3];
-
-  for (int d = 0; d < 3; d++) at[d] = 2 * rint(xyz[d] * cubes->n) - cubes->n;
-  for (int d = 0; d < 3; d++)
-    xyz[d] = cubes->turned ? turn[d][0] * at[0] + turn[d][1] * at[1] + turn[d][2] * at[2] + move[d] : BENCH_EDGE * at[d];
-}
-
 /* Along each axis, lengths grow 1000 times. */
 static inline void bench_grade_(double xyz[3], const void *data)
 {
@@ -207,8 +188,8 @@ static inline bool bench_meshes(const char *name, int n, tm_mesh *mesh[2])
     const double by = shifted ? .5 / n : 1, m[12] = {1, 0, 0, by, 0, 1, 0, shifted ? by : 0, 0, 0, 1, shifted ? by : 0};
     mesh[0] = tm_hexahedra(coarse, NULL, NULL), mesh[1] = tm_hexahedra(coarse, tm_affine, m);
   } else if (!strcmp(name, "boxes")) {
-    mesh[0] = tm_hexahedra(coarse, bench_cube_, &(bench_cubes_){n, true});
-    mesh[1] = tm_hexahedra(fine, bench_cube_, &(bench_cubes_){2 * n, false});
+    mesh[0] = tm_hexahedra(coarse, tm_cube, &(tm_cubing){{n, n, n}, true});
+    mesh[1] = tm_hexahedra(fine, tm_cube, &(tm_cubing){{2 * n, 2 * n, 2 * n}, false});
   } else if (!strcmp(name, "tetrahedra") || !strcmp(name, "dual")) {
     bench_maker_ *make = name[0] == 't' ? tm_tetrahedra : tm_dual;
     mesh[0] = bench_placed_(make(coarse, tm_warp, &first), .3, .5), mesh[1] = bench_placed_(make(fine, tm_warp, &second), 0, 1);

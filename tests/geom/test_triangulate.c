@@ -397,10 +397,55 @@ static void faces_without_area_are_covered_by_triangles_without_area(void)
     }
 }
 
+/* Whichever vertex comes first, whichever way the loop runs, and in whatever plane. */
+static bool planar_convex(double (*xyz)[3], int n, bool want)
+{
+  bool same = true;
+
+  for (int turn = 0; turn < 3; turn++)
+    for (int start = 0; start < n; start++)
+      for (int step = -1; step <= 1; step += 2) {
+        double loop[MAX_N][3];
+
+        for (int k = 0; k < n; k++)
+          for (int c = 0; c < 3; c++) loop[k][c] = xyz[(start + n + step * k) % n][(c + turn) % 3];
+        same = same && rm_is_planar_convex((const double(*)[3])loop, n) == want;
+      }
+  return same;
+}
+
+static void planar_convex_loops_are_told_from_all_others(void)
+{
+  double square[][3]   = {{1, 2, 3}, {164, 84, -11}, {90, 241, 47}, {-73, 159, 61}}, low[4][3];
+  double straight[][3] = {{0, 0, 0}, {1, 0, 1}, {3, 0, 3}, {3, 1, 4}, {3, 5, 8}, {0, 5, 5}};
+  double concave[][3]  = {{0, 0, 0}, {4, 0, 0}, {1, 1, 0}, {0, 4, 0}};
+  double star[][3]     = {{0, 3, 0}, {2, -3, 0}, {-3, 1, 0}, {3, 1, 0}, {-2, -3, 0}};
+  double twice[][3]    = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  double bow[][3]      = {{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}};
+  double spike[][3]    = {{0, 0, 0}, {2, 0, 0}, {1, 0, 0}, {0, 2, 0}};
+  double repeated[][3] = {{0, 0, 0}, {2, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  double line[][3]     = {{0, 0, 0}, {1, 2, 3}, {3, 6, 9}, {2, 4, 6}};
+
+  memcpy(low, square, sizeof low);
+  low[2][1] = nextafter(low[2][1], 0);
+  RT_CHECK(planar_convex(square, 4, true));
+  RT_CHECK(planar_convex(straight, 6, true));
+  RT_CHECK(planar_convex(square, 3, true));
+  RT_CHECK(planar_convex(low, 4, false));
+  RT_CHECK(planar_convex(concave, 4, false));
+  RT_CHECK(planar_convex(star, 5, false));
+  RT_CHECK(planar_convex(twice, 6, false));
+  RT_CHECK(planar_convex(bow, 4, false));
+  RT_CHECK(planar_convex(spike, 4, false));
+  RT_CHECK(planar_convex(repeated, 4, false));
+  RT_CHECK(planar_convex(line, 4, false));
+}
+
 RT_MAIN(RT_CASE(triangles_depend_on_neither_start_nor_direction_of_the_loop),
         RT_CASE(the_boundary_of_the_triangles_is_the_loop),
         RT_CASE(flat_faces_take_two_triangles_less_than_vertices_and_cover_them_once),
         RT_CASE(warped_faces_are_fans_about_their_mean), RT_CASE(the_centre_stays_in_the_box_of_the_face),
         RT_CASE(a_quadrangle_is_cut_along_its_shorter_diagonal),
         RT_CASE(a_concave_quadrangle_is_cut_inside), RT_CASE(hanging_vertices_stay_corners_and_lie_on_no_diagonal),
-        RT_CASE(repeated_vertices_vanish), RT_CASE(faces_without_area_are_covered_by_triangles_without_area))
+        RT_CASE(repeated_vertices_vanish), RT_CASE(faces_without_area_are_covered_by_triangles_without_area),
+        RT_CASE(planar_convex_loops_are_told_from_all_others))

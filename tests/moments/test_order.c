@@ -101,6 +101,32 @@ static void patched_zones(void)
     check(tm_two_zones((int[]){2, 3, 3}, (int[]){2, 3, 2}, k * 1e-3, NULL, NULL), third);
   }
 }
+static void planar_boxes(void)
+{
+  check(tm_hexahedra((int[]){3, 3, 3}, tm_cube, &(tm_cubing){{3, 3, 3}, true}),
+        tm_hexahedra((int[]){4, 3, 4}, tm_cube, &(tm_cubing){{4, 3, 4}, false}));
+}
+static void planar_faces_with_hanging_nodes(void)
+{
+  check(tm_refined((int[]){2, 2, 2}, tm_checkered, tm_cube, &(tm_cubing){{2, 2, 2}, true}),
+        tm_refined((int[]){2, 2, 2}, tm_right_half, tm_cube, &(tm_cubing){{2, 2, 2}, false}));
+}
+
+/* Where the zones meet, each face of one is two of the other, cut along the same diagonal: one way of shearing makes that the
+ * shorter one. */
+static void quadrangles_patched_to_pairs_of_triangles(void)
+{
+  for (int way = -1; way <= 1; way += 2) {
+    tm_mesh *boxes = tm_hexahedra((int[]){2, 2, 2}, NULL, NULL), *prisms = tm_prisms((int[]){2, 2, 2}, NULL, NULL), *third;
+
+    tm_move(prisms, tm_affine, (double[]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1});
+    boxes = tm_join(boxes, prisms);
+    tm_move(boxes, tm_affine, (double[]){1, .25 * way, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+    third = tm_hexahedra((int[]){3, 2, 3}, tm_cube, &(tm_cubing){{3, 2, 3}, true});
+    placed(third, 0x1p-9, .5);
+    check(boxes, third);
+  }
+}
 static void pancakes(void)
 {
   tm_mesh *a = tm_benchmark(4, .7, 0, .9), *b = tm_benchmark(4, .1, 0, 1);
@@ -119,4 +145,5 @@ static void coarse_cells_around_small_ones(void)
 
 RT_MAIN(RT_CASE(warped_and_turned_hexahedra), RT_CASE(meshes_that_stick_out_of_each_other), RT_CASE(identical_meshes),
         RT_CASE(nested_and_aligned_boxes), RT_CASE(polyhedra_and_hanging_nodes), RT_CASE(tetrahedra_on_mixed_cells),
-        RT_CASE(patched_zones), RT_CASE(pancakes), RT_CASE(coarse_cells_around_small_ones))
+        RT_CASE(patched_zones), RT_CASE(planar_boxes), RT_CASE(planar_faces_with_hanging_nodes),
+        RT_CASE(quadrangles_patched_to_pairs_of_triangles), RT_CASE(pancakes), RT_CASE(coarse_cells_around_small_ones))

@@ -127,6 +127,25 @@ static inline void tm_affine(double xyz[3], const void *data)
   for (int r = 0; r < 3; r++) xyz[r] = m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
 }
 
+/* The lattice's n[0] x n[1] x n[2] boxes as cubes of edge 366 about the origin; `turned`: by the rotation of the quaternion
+ * (13, 2, 1, 3), which is rational with denominator 183, and moved a little. All coordinates are exact, so that faces are
+ * exactly planar; turned cubes are in general position to those that are not. */
+typedef struct tm_cubing {
+  int  n[3];
+  bool turned;
+} tm_cubing;
+static inline void tm_cube(double xyz[3], const void *data)
+{
+  static const double turn[3][3] = {{163, -74, 38}, {82, 157, -46}, {-14, 58, 173}};
+  static const double move[3]    = {37 + 311 / 1024., 101 + 717 / 1024., -59 - 103 / 1024.};
+  const tm_cubing    *cubes      = data;
+  double              at[3];
+
+  for (int d = 0; d < 3; d++) at[d] = rint(2 * xyz[d] * cubes->n[d]) - cubes->n[d]; /* halves, too, come to lie exactly */
+  for (int d = 0; d < 3; d++)
+    xyz[d] = cubes->turned ? turn[d][0] * at[0] + turn[d][1] * at[1] + turn[d][2] * at[2] + move[d] : 183 * at[d];
+}
+
 /* Rotation by an angle about z, then by the same angle about x. */
 static inline void tm_rotate_(double xyz[3], double angle)
 {

@@ -74,16 +74,16 @@ INLINE void cone(const double n[3], double height, const double r[3], const doub
   }
 }
 
-static void add_local(slot *s, double sign, const plane *pl, const point *p, const point *q, int num_sums)
+/* The same about the slot's own origin, p and q being relative to that; v is a vertex in the plane. */
+static __attribute__((noinline)) void add_local(slot *s, double sign, const double n[3], const double v[3], double inverse,
+                                                const double p[3], const double q[3], int num_sums)
 {
-  double       a[3], b[3], r[3], out[10];
-  const double d[3] = {pl->v[0] - s->o[0], pl->v[1] - s->o[1], pl->v[2] - s->o[2]};
-  const double height = (pl->n[0] * d[0] + pl->n[1] * d[1] + pl->n[2] * d[2]) * pl->inverse;
+  double       r[3], out[10];
+  const double d[3]   = {v[0] - s->o[0], v[1] - s->o[1], v[2] - s->o[2]};
+  const double height = (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * inverse;
 
-  relative(p, s->o, a);
-  relative(q, s->o, b);
-  for (int c = 0; c < 3; c++) r[c] = pl->n[c] * height;
-  cone(pl->n, height, r, a, b, sign, num_sums, out);
+  for (int c = 0; c < 3; c++) r[c] = n[c] * height;
+  cone(n, height, r, p, q, sign, num_sums, out);
   for (int k = 0; k < num_sums; k++) s->sum[k] += out[k];
 }
 
@@ -100,9 +100,15 @@ INLINE void add_cone(work *w, rm_lid i, const rm_lid j[2], int kind, double sign
     if (!s) return;
     s->num_cones++;
     s->kinds |= kind;
-    if (s->is_local) add_local(s, h ? -sign : sign, pl, p, q, num_sums);
-    else
+    if (s->is_local) {
+      double a[3], b[3];
+
+      relative(p, s->o, a);
+      relative(q, s->o, b);
+      add_local(s, h ? -sign : sign, pl->n, pl->v, pl->inverse, a, b, num_sums);
+    } else {
       for (int k = 0; k < num_sums; k++) s->sum[k] += h ? -out[k] : out[k];
+    }
   }
 }
 
@@ -121,8 +127,12 @@ INLINE void add_two_cones(work *w, rm_lid i, const rm_lid j[2], int kind, double
     s->num_cones += 2;
     s->kinds |= kind;
     if (s->is_local) {
-      add_local(s, h ? -sign : sign, pl, p, q, num_sums);
-      add_local(s, h ? sign : -sign, other, p, q, num_sums);
+      double a[3], b[3];
+
+      relative(p, s->o, a);
+      relative(q, s->o, b);
+      add_local(s, h ? -sign : sign, pl->n, pl->v, pl->inverse, a, b, num_sums);
+      add_local(s, h ? sign : -sign, other->n, other->v, other->inverse, a, b, num_sums);
     } else {
       for (int k = 0; k < num_sums; k++) s->sum[k] = h ? (s->sum[k] - out[k]) - back[k] : (s->sum[k] + out[k]) + back[k];
     }
@@ -153,27 +163,34 @@ INLINE void add_2(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, c
 
 /* ---- enumeration of the polygons' sides in cell i ------------------------------------------------------------------- */
 
-INLINE point vertex_point(const work *w, const rm_trimesh *m, rm_lid v)
+/* Points are written where they stay: a copy made at once would wait for its parts to arrive in memory. */
+INLINE void set_vertex(const work *w, const rm_trimesh *m, rm_lid v, point *p)
 {
-  point p = {m->vertex[v], {0, 0, 0}, {0, 0, 0}, 0, -1, -1, -1};
-
-  for (int c = 0; c < 3; c++) p.at[c] = p.base[c] - w->centre[c];
-  return p;
+  p->base = m->vertex[v];
+  for (int c = 0; c < 3; c++) {
+    p->delta[c] = 0;
+    p->at[c]    = p->base[c] - w->centre[c];
+  }
+  p->mesh     = 0;
+  p->edge     = -1;
+  p->triangle = -1;
+  p->crossing = -1;
 }
 
-INLINE point crossing_point(const work *w, int mesh, const rm_crossing *x)
+INLINE void set_crossing(const work *w, int mesh, const rm_crossing *x, point *p)
 {
   const rm_trimesh *m = w->o->mesh[mesh];
   const double     *v = m->vertex[m->edge[x->edge][0]], *u = m->vertex[m->edge[x->edge][1]], l = x->lambda;
-  point             p = {.base     = v,
-                         .delta    = {l * (u[0] - v[0]), l * (u[1] - v[1]), l * (u[2] - v[2])},
-                         .mesh     = mesh,
-                         .edge     = x->edge,
-                         .triangle = x->triangle / 2,
-                         .crossing = x - w->o->trace[mesh].crossing};
 
-  relative(&p, w->centre, p.at);
-  return p;
+  p->base = v;
+  for (int c = 0; c < 3; c++) {
+    p->delta[c] = l * (u[c] - v[c]);
+    p->at[c]    = (v[c] - w->centre[c]) + p->delta[c];
+  }
+  p->mesh     = mesh;
+  p->edge     = x->edge;
+  p->triangle = x->triangle / 2;
+  p->crossing = x - w->o->trace[mesh].crossing;
 }
 
 INLINE plane plane_of(const work *w, int mesh, rm_lid t)
@@ -196,24 +213,26 @@ INLINE void segments_in(work *w, rm_lid i, const plane *pt, sink *add_side)
     const rm_end start = o->end[k], end = o->end[k + 1];
     const rm_lid b     = start.other;
     if (w->skin_only && !(skin & SKIN_SOURCE) && !o->mesh[1]->triangle_is_skin[b]) continue;
-    const point  p     = crossing_point(w, start.at >> 1 & 1, &o->trace[start.at >> 1 & 1].crossing[start.at >> 2]);
-    const point  q     = crossing_point(w, end.at >> 1 & 1, &o->trace[end.at >> 1 & 1].crossing[end.at >> 2]);
     const plane  pb    = plane_of(w, 1, b);
     const int    kind  = skin | (o->mesh[1]->triangle_is_skin[b] ? SKIN_TARGET : 0);
 
+    point        p, q;
+
+    set_crossing(w, start.at >> 1 & 1, &o->trace[start.at >> 1 & 1].crossing[start.at >> 2], &p);
+    set_crossing(w, end.at >> 1 & 1, &o->trace[end.at >> 1 & 1].crossing[end.at >> 2], &q);
     add_side(w, i, o->mesh[1]->side[b], kind, pt->outward, pt, &pb, &p, &q);
   }
 }
 
 /* Point k of an edge of `mesh`, where its piece k begins and its piece k - 1 ends. */
-INLINE point piece_point(const work *w, int mesh, rm_lid e, rm_lid k)
+INLINE void set_point(const work *w, int mesh, rm_lid e, rm_lid k, point *p)
 {
   const rm_trimesh *m  = w->o->mesh[mesh];
   const rm_trace   *tr = &w->o->trace[mesh];
 
-  if (k == 0) return vertex_point(w, m, m->edge[e][0]);
-  if (k > tr->count[e]) return vertex_point(w, m, m->edge[e][1]);
-  return crossing_point(w, mesh, &tr->crossing[tr->first[e] + k - 1]);
+  if (k == 0) set_vertex(w, m, m->edge[e][0], p);
+  else if (k > tr->count[e]) set_vertex(w, m, m->edge[e][1], p);
+  else set_crossing(w, mesh, &tr->crossing[tr->first[e] + k - 1], p);
 }
 
 INLINE rm_lid piece_state(const rm_trace *tr, rm_lid e, rm_lid k)
@@ -252,13 +271,14 @@ static void tangled_pieces(work *w, rm_lid i, rm_lid e, rm_lid k, int kind, doub
   const rm_winding  one   = {state, 1};
   const rm_winding *list  = state < RM_OUTSIDE ? tr->winding + tr->list_offset[-2 - state] : &one;
   const rm_lid      n     = state < RM_OUTSIDE ? tr->list_offset[-1 - state] - tr->list_offset[-2 - state] : state >= 0;
-  const point       p     = piece_point(w, 0, e, k);
+  point             p, q;
 
+  set_point(w, 0, e, k, &p);
   for (rm_lid z = 0; z < n; z++) {
     const rm_lid in[2] = {list[z].cell, RM_OUTSIDE}, end = run_end(tr, e, k, in[0], list[z].number);
 
     if (end == k) continue;
-    const point q = piece_point(w, 0, e, end);
+    set_point(w, 0, e, end, &q);
     add_side(w, i, in, kind, sign * list[z].number, pl, other, &p, &q);
   }
 }
@@ -275,18 +295,18 @@ INLINE void pieces_at(work *w, rm_lid i, const wedge *at, sink *add_side)
   const rm_lid    e = at->edge, count = tr->count[e];
   const double    sign   = along ? 1 : -1;
   rm_lid          before = RM_OUTSIDE, in[2] = {tr->state[e], RM_OUTSIDE};
-  point           p = piece_point(w, 0, e, 0);
+  point           end[2]; /* of piece k: [k & 1] and the other */
 
   if (w->skin_only && !(kind & SKIN_SOURCE)) return;
+  set_point(w, 0, e, 0, &end[0]);
   for (rm_lid k = 0; k <= count; k++) {
     const rm_lid next = k < count ? tr->crossing[tr->first[e] + k].state : RM_OUTSIDE;
-    const point  q    = piece_point(w, 0, e, k + 1);
 
+    set_point(w, 0, e, k + 1, &end[~k & 1]);
     if (before < RM_OUTSIDE || in[0] < RM_OUTSIDE || next < RM_OUTSIDE || (in[0] >= 0 && (in[0] == before || in[0] == next)))
       tangled_pieces(w, i, e, k, kind, sign, pl, other, add_side);
     else
-      add_side(w, i, in, kind, sign, pl, other, &p, &q);
-    p      = q;
+      add_side(w, i, in, kind, sign, pl, other, &end[k & 1], &end[~k & 1]);
     before = in[0];
     in[0]  = next;
   }
@@ -302,9 +322,11 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
     const rm_lid f = w->piece[k][0], at = w->piece[k][1];
     const int    number = piece_number(tr, f, at, i);
     const rm_lid end    = run_end(tr, f, at, i, number);
+    point        p, q;
 
     if (end == at) continue;
-    const point p = piece_point(w, 1, f, at), q = piece_point(w, 1, f, end);
+    set_point(w, 1, f, at, &p);
+    set_point(w, 1, f, end, &q);
     for (rm_lid z = m->ring_offset[f]; z < m->ring_offset[f + 1]; z++) {
       const rm_lid b  = m->ring[z] / 4;
       if (w->skin_only && !m->triangle_is_skin[b]) continue;
@@ -316,8 +338,8 @@ INLINE void foreign_pieces(work *w, rm_lid i, sink *add_side)
   }
 }
 
-/* Edge e of cell i bounds its facet in the plane of that number, whose boundary runs along it, seen from outside of the cell, or
- * against it. An edge has one facet each way nearly always: these two are one wedge. */
+/* Edge e of cell i bounds its facet of that number, whose boundary, seen from outside of the cell, runs along it or against it.
+ * An edge has one facet each way nearly always: these two are one wedge. */
 static remap_status add_to_wedge(work *w, rm_lid e, int number, bool against)
 {
   const int k = w->wedge_of[e];
