@@ -46,9 +46,6 @@ typedef struct rm_quadratic_room {
 bool rm_quadratic_weights(int64_t n, const double (*d)[3], const double (*spread)[6], const rm_distance_noise *noise,
                           rm_quadratic_room *room, double (*weight)[9]);
 
-/* Rows and columns of the six numbers of a symmetric matrix: xx, yy, zz, xy, xz, yz. */
-static const int rm_row_of[6] = {0, 1, 2, 0, 0, 1}, rm_column_of[6] = {0, 1, 2, 1, 2, 2};
-
 /* ---- reconstruct ----------------------------------------------------------------------------------------------- */
 
 /* Sums and slopes are of values times this power of two, so that differences of the largest values and slopes over small cells

@@ -1,7 +1,7 @@
 /* expansion -- error-free transformations (Knuth, Dekker) and the double-double arithmetic built on them: a value is the
  * unevaluated sum hi + lo with |lo| at most half an ulp of hi. Only additions and multiplications in round-to-nearest, no fused
- * operations, so that the result is the same on every processor. Magnitudes must stay within 2^-1000..2^990. Shared by geom and
- * moments. */
+ * operations, so that the result is the same on every processor. Magnitudes must stay within 2^-1000..2^990. Shared by geom,
+ * mesh, moments and cells. */
 #ifndef RM_GEOM_EXPANSION_H
 #define RM_GEOM_EXPANSION_H
 

@@ -66,6 +66,11 @@ int rm_triangulate(const double (*xyz)[3], int n, remap_faces faces, int *corner
  * mean. O(n); 10 ns where the fourth point is off the plane. */
 bool rm_is_planar_convex(const double (*xyz)[3], int n);
 
+/* ---- symmetric matrices ------------------------------------------------------------------------------------------- */
+
+/* Rows and columns of the six numbers of one, as second moments are kept everywhere: xx, yy, zz, xy, xz, yz. */
+static const int rm_row_of[6] = {0, 1, 2, 0, 0, 1}, rm_column_of[6] = {0, 1, 2, 1, 2, 2};
+
 /* ---- double-double ------------------------------------------------------------------------------------------------ */
 
 typedef struct rm_dd { double hi, lo; } rm_dd;

@@ -7,6 +7,7 @@
  * not vouch for 50 bits (a flat cell), volume and centroid are summed without any rounding. Second moments are those of the
  * tetrahedra that the triangles span with the centroid.
  * About 0.1 us per triangle, 0.2 us more for second moments; scratch memory for the largest cell. */
+#include "geom/expansion.h"
 #include "mesh/mesh_private.h"
 
 #include <float.h>
@@ -34,20 +35,6 @@ typedef struct vec {
 
 /* ---- arithmetic -------------------------------------------------------------------------------------------------------- */
 
-static inline rm_dd two_sum(double a, double b)
-{
-  const double sum = a + b, part = sum - a;
-  return (rm_dd){sum, (a - (sum - part)) + (b - part)};
-}
-
-static inline rm_dd two_product(double a, double b)
-{
-  const double factor = 0x1p27 + 1, product = a * b;
-  const double ca = factor * a, ah = ca - (ca - a), al = a - ah;
-  const double cb = factor * b, bh = cb - (cb - b), bl = b - bh;
-  return (rm_dd){product, al * bl - (((product - ah * bh) - al * bh) - ah * bl)};
-}
-
 /* Sum of n <= 2^spare doubles, which does not depend on their order; error below 2^(4 spare - 156) max |x| and its rounding. x
  * is used up. Three bins: each takes the bits of all numbers above its last place, so that their sum is exact. */
 static double sum_binned(double *x, int64_t n)
@@ -72,7 +59,7 @@ static double sum_binned(double *x, int64_t n)
     }
     exponent += spare - 52;
   }
-  high = two_sum(bin[0], bin[1]);
+  high = rm_two_sum(bin[0], bin[1]);
   return high.hi + (high.lo + bin[2]);
 }
 
@@ -142,8 +129,8 @@ static int64_t moment_terms(const triangle *list, int64_t num, const double *vol
     if (one_sign) {
       out[i] = w * ((t->p[0][axis] - o) + (t->p[1][axis] - o) + (t->p[2][axis] - o));
     } else {
-      const rm_dd  u = two_sum(t->p[0][axis], -o), v = two_sum(t->p[1][axis], -o), x = two_sum(t->p[2][axis], -o);
-      const rm_dd  uv = two_sum(u.hi, v.hi), sum = two_sum(uv.hi, x.hi), product = two_product(w, sum.hi);
+      const rm_dd  u = rm_two_sum(t->p[0][axis], -o), v = rm_two_sum(t->p[1][axis], -o), x = rm_two_sum(t->p[2][axis], -o);
+      const rm_dd  uv = rm_two_sum(u.hi, v.hi), sum = rm_two_sum(uv.hi, x.hi), product = rm_two_product(w, sum.hi);
       const double rest = (uv.lo + sum.lo) + (u.lo + v.lo + x.lo);
 
       out[2 * i]     = product.hi;
@@ -178,8 +165,8 @@ static double sum_about(const double o[3], int64_t num, workspace *w, vec *momen
 /* Add sign * x y z, and times each of the corners' coordinates to their moments, exactly. */
 static void add_exact(rm_sum *volume, rm_sum moment[3], const triangle *t, double sign, double x, double y, double z)
 {
-  const rm_dd  xy   = two_product(sign * x, y);
-  const rm_dd  high = two_product(xy.hi, z), low = two_product(xy.lo, z);
+  const rm_dd  xy   = rm_two_product(sign * x, y);
+  const rm_dd  high = rm_two_product(xy.hi, z), low = rm_two_product(xy.lo, z);
   const double part[4] = {high.hi, high.lo, low.hi, low.lo};
 
   for (int i = 0; i < 4; i++) {
@@ -232,20 +219,6 @@ static void integrate(const double box[6], int64_t num, workspace *w, double *vo
 
 /* ---- second moments ------------------------------------------------------------------------------------------------------ */
 
-static rm_dd dd_sum(rm_dd a, rm_dd b)
-{
-  const rm_dd sum = two_sum(a.hi, b.hi);
-
-  return two_sum(sum.hi, sum.lo + (a.lo + b.lo));
-}
-
-static rm_dd dd_product(rm_dd a, rm_dd b)
-{
-  const rm_dd product = two_product(a.hi, b.hi);
-
-  return two_sum(product.hi, product.lo + (a.hi * b.lo + a.lo * b.hi));
-}
-
 /* Terms of 120 S along axes x and y, from those of 6 V: w times the sum over corners of x y plus the product of the sums of x
  * and of y, both from o. In double-double: products off the diagonal cancel. Returns how many there are. */
 static int64_t second_terms(const triangle *list, int64_t num, const double *volume, const double o[3], int x, int y,
@@ -256,13 +229,13 @@ static int64_t second_terms(const triangle *list, int64_t num, const double *vol
     rm_dd           sum[2] = {{0.0, 0.0}, {0.0, 0.0}}, total = {0.0, 0.0};
 
     for (int k = 0; k < 3; k++) {
-      const rm_dd u = two_sum(t->p[k][x], -o[x]), v = two_sum(t->p[k][y], -o[y]);
+      const rm_dd u = rm_two_sum(t->p[k][x], -o[x]), v = rm_two_sum(t->p[k][y], -o[y]);
 
-      sum[0] = dd_sum(sum[0], u);
-      sum[1] = dd_sum(sum[1], v);
-      total  = dd_sum(total, dd_product(u, v));
+      sum[0] = rm_dd_add(sum[0], u);
+      sum[1] = rm_dd_add(sum[1], v);
+      total  = rm_dd_add(total, rm_dd_mul(u, v));
     }
-    total          = dd_product(dd_sum(total, dd_product(sum[0], sum[1])), (rm_dd){volume[2 * i], volume[2 * i + 1]});
+    total          = rm_dd_mul(rm_dd_add(total, rm_dd_mul(sum[0], sum[1])), (rm_dd){volume[2 * i], volume[2 * i + 1]});
     out[2 * i]     = total.hi;
     out[2 * i + 1] = total.lo;
   }
@@ -271,8 +244,6 @@ static int64_t second_terms(const triangle *list, int64_t num, const double *vol
 
 static void integrate_second(const double centroid[3], int64_t num, workspace *w, double second[6])
 {
-  static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-
   for (int64_t i = 0; i < num; i++) {
     const triangle *t = &w->triangle[i];
     const rm_dd     d = rm_det_dd(centroid, t->p[0], t->p[1], t->p[2]);
@@ -280,9 +251,11 @@ static void integrate_second(const double centroid[3], int64_t num, workspace *w
     w->volume[2 * i]     = t->sign * d.hi;
     w->volume[2 * i + 1] = t->sign * d.lo;
   }
-  for (int k = 0; k < 6; k++)
-    second[k] =
-        sum_binned(w->moment, second_terms(w->triangle, num, w->volume, centroid, row[k], column[k], w->moment)) / 120.0;
+  for (int k = 0; k < 6; k++) {
+    const int64_t n = second_terms(w->triangle, num, w->volume, centroid, rm_row_of[k], rm_column_of[k], w->moment);
+
+    second[k] = sum_binned(w->moment, n) / 120.0;
+  }
 }
 
 /* ---- all cells ----------------------------------------------------------------------------------------------------------- */

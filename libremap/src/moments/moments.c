@@ -55,8 +55,6 @@ INLINE double triple(const double n[3], const double p[3], const double q[3])
   return n[0] * (p[1] * q[2] - p[2] * q[1]) + n[1] * (p[2] * q[0] - p[0] * q[2]) + n[2] * (p[0] * q[1] - p[1] * q[0]);
 }
 
-static const int row_of[6] = {0, 1, 2, 0, 0, 1}, column_of[6] = {0, 1, 2, 1, 2, 2}; /* of second moments */
-
 /* 6 V, 24 M and, of ten sums, 120 S of the tetrahedron (O, r, p, q), with r = height n. */
 INLINE void cone(const double n[3], double height, const double r[3], const double p[3], const double q[3], double sign,
                  int num_sums, double out[10])
@@ -69,7 +67,7 @@ INLINE void cone(const double n[3], double height, const double r[3], const doub
     out[1 + c] = out[0] * sum[c];
   }
   for (int k = 0; k < num_sums - 4; k++) {
-    const int x = row_of[k], y = column_of[k];
+    const int x = rm_row_of[k], y = rm_column_of[k];
     out[4 + k] = out[0] * (r[x] * r[y] + p[x] * p[y] + q[x] * q[y] + sum[x] * sum[y]);
   }
 }
@@ -454,7 +452,7 @@ static void add_cone_dd(work *w, rm_lid j, double sign, const plane *pl, const p
   sum[0] = rm_dd_add(sum[0], six_v);
   for (int c = 0; c < 3; c++) sum[1 + c] = rm_dd_add(sum[1 + c], rm_dd_mul(six_v, rm_dd_add(r[c], rm_dd_add(a[c], b[c]))));
   for (int k = 0; k < w->num_sums - 4; k++) {
-    const int   x = row_of[k], y = column_of[k];
+    const int   x = rm_row_of[k], y = rm_column_of[k];
     const rm_dd sx = rm_dd_add(r[x], rm_dd_add(a[x], b[x])), sy = rm_dd_add(r[y], rm_dd_add(a[y], b[y]));
     const rm_dd own = rm_dd_add(rm_dd_mul(r[x], r[y]), rm_dd_add(rm_dd_mul(a[x], a[y]), rm_dd_mul(b[x], b[y])));
     sum[4 + k] = rm_dd_add(sum[4 + k], rm_dd_mul(six_v, rm_dd_add(own, rm_dd_mul(sx, sy))));
@@ -478,7 +476,7 @@ static void add_dd(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, 
 static void shift_second(const slot *s, const double m[3], const double d[3], double second[6])
 {
   for (int k = 0; k < 6; k++) {
-    const int x = row_of[k], y = column_of[k];
+    const int x = rm_row_of[k], y = rm_column_of[k];
     second[k] = s->sum[4 + k] / 120 + (d[x] * m[y] + d[y] * m[x]) + d[x] * d[y] * (s->sum[0] / 6);
   }
 }
