@@ -339,7 +339,8 @@ typedef struct remap_supermesh_options {
   int aggregate;     /**< pieces of one face between the same two cells become one polygon: 0 (default) where they are coplanar;
                           else also where they are not, wherever that leaves cells closed; the polygons' volumes are then not
                           those of the cells */
-  int split_concave; /**< not 0: concave polygons are cut into convex ones; default 0 */
+  int split_concave; /**< not 0: concave polygons are cut into convex ones, along edges of the meshes' triangles where they have
+                          those; default 0 */
   int pass_through;  /**< not 0 (default): cells that meet nothing of the other mesh are part of the result, as they were
                           given */
 } remap_supermesh_options;

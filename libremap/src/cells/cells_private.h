@@ -169,8 +169,14 @@ typedef struct rm_parts {
 
 /* True if the loop, which runs counter-clockwise in the view, turns right nowhere. Exact. */
 bool rm_is_convex(const rm_view *view, const rm_lid *loop, rm_lid n);
-/* Cut a loop, which runs counter-clockwise, into convex ones; what out held is forgotten. NO_MEMORY. */
-remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, rm_parts *out);
+/* Polygons that make one together. */
+typedef struct rm_pieces {
+  const rm_polygons *p;
+  const rm_lid      *polygon; /* [num] */
+  rm_lid             num;
+} rm_pieces;
+/* Cut a loop, which runs counter-clockwise, around the pieces into convex ones; what out held is forgotten. NO_MEMORY. */
+remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, const rm_pieces *of, rm_parts *out);
 
 /* ---- edges of polygons ------------------------------------------------------------------------------------------- */
 

@@ -1,14 +1,16 @@
-/* convex -- a concave polygon cut into convex ones (DESIGN 2.8): it is triangulated on its own vertices; then, again and
- * again, the vertex of the largest angle is cut from along the triangles' edge that leaves an angle below half a turn and
- * closest to it. Which angles are below half a turn is exact, so every part is convex. O(n^2) for n vertices. */
+/* convex -- a concave polygon cut into convex ones (DESIGN 2.8), along edges of triangles: those of the operands' triangulation
+ * where they go through it, and within a piece of one triangle those of a triangulation of the piece. Again and again the
+ * vertex of the largest angle is cut from along the edge that leaves an angle below half a turn and closest to it. Which angles
+ * are below half a turn is exact, so every part is convex. O(n^2) for n vertices. */
 #include "cells/cells_private.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 typedef struct work {
   const rm_view *view;
-  const rm_lid  *corner; /* [num][3] triangles */
+  rm_lid        *corner; /* [num][3] triangles */
   int64_t        num;
   rm_arena      *scratch;
   rm_parts      *out;
@@ -110,21 +112,85 @@ static remap_status cut(work *w, const rm_lid *loop, rm_lid n)
   return cut(w, part, n - far + 1);
 }
 
-remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, rm_parts *out)
-{
-  work          w         = {.view = view, .scratch = rm_arena_new(), .out = out};
-  const int64_t offset[2] = {0, n};
-  rm_lid       *from = NULL, *corner = NULL, least = 0;
-  remap_status  status = w.scratch ? REMAP_OK : REMAP_NO_MEMORY;
+/* ---- triangles --------------------------------------------------------------------------------------------------- */
 
-  out->num = out->num_vertices = 0;
-  if (status == REMAP_OK) from = rm_arena_alloc(w.scratch, n, sizeof *from);
-  if (!from) status = REMAP_NO_MEMORY;
+/* The loop from its least vertex on, wherever it began. */
+static remap_status from_least(work *w, const rm_lid *loop, rm_lid n, rm_lid **out)
+{
+  rm_lid least = 0;
+
   for (rm_lid k = 1; k < n; k++)
     if (loop[k] < loop[least]) least = k;
-  for (rm_lid k = 0; k < n && from; k++) from[k] = loop[(least + k) % n];
-  if (status == REMAP_OK) status = rm_cut_holes(w.scratch, view, 1, offset, from, &corner, &w.num);
-  w.corner = corner;
+  RM_NEW(*out, w->scratch, n);
+  for (rm_lid k = 0; k < n; k++) (*out)[k] = loop[(least + k) % n];
+  return REMAP_OK;
+}
+
+/* Add the triangles of a loop on its own vertices. */
+static remap_status add_triangles(work *w, const rm_view *view, const rm_lid *loop, rm_lid n)
+{
+  const int64_t offset[2] = {0, n};
+  rm_lid       *from, *corner;
+  int64_t       num;
+
+  RM_TRY(from_least(w, loop, n, &from));
+  RM_TRY(rm_cut_holes(w->scratch, view, 1, offset, from, &corner, &num));
+  memcpy(w->corner + 3 * w->num, corner, sizeof *corner * 3 * (size_t)num);
+  w->num += num;
+  return REMAP_OK;
+}
+
+static int by_spot(const void *a, const void *b)
+{
+  const rm_lid x = *(const rm_lid *)a, y = *(const rm_lid *)b;
+  return (x > y) - (x < y);
+}
+
+/* True if the loop has all vertices of the pieces; *total receives how many the pieces have. */
+static remap_status has_all(work *w, const rm_lid *loop, rm_lid n, const rm_pieces *of, bool *all, int64_t *total)
+{
+  rm_lid *sorted;
+
+  *total = 0;
+  *all   = true;
+  RM_NEW(sorted, w->scratch, n);
+  memcpy(sorted, loop, sizeof *sorted * (size_t)n);
+  qsort(sorted, (size_t)n, sizeof *sorted, by_spot);
+  for (rm_lid k = 0; k < of->num; k++) {
+    const rm_lid *piece = rm_polygon_loop(of->p, of->polygon[k]), m = rm_polygon_size(of->p, of->polygon[k]);
+
+    *total += m;
+    for (rm_lid i = 0; i < m && *all; i++) *all = bsearch(&piece[i], sorted, (size_t)n, sizeof *sorted, by_spot) != NULL;
+  }
+  return REMAP_OK;
+}
+
+/* The triangles of the polygon: of its pieces, or of its own where those have vertices inside of it. */
+static remap_status triangulate(work *w, const rm_lid *loop, rm_lid n, const rm_pieces *of)
+{
+  int64_t total;
+  bool    all;
+
+  RM_TRY(has_all(w, loop, n, of, &all, &total));
+  RM_NEW(w->corner, w->scratch, 3 * (total > n ? total : n));
+  if (!all) return add_triangles(w, w->view, loop, n);
+  for (rm_lid k = 0; k < of->num; k++) {
+    const rm_lid  own  = of->p->own[of->polygon[k]];
+    const rm_view view = rm_view_of(w->view->l, own & 1, own / 2);
+
+    RM_TRY(add_triangles(w, &view, rm_polygon_loop(of->p, of->polygon[k]), rm_polygon_size(of->p, of->polygon[k])));
+  }
+  return REMAP_OK;
+}
+
+remap_status rm_cut_convex(const rm_view *view, rm_lid n, const rm_lid *loop, const rm_pieces *of, rm_parts *out)
+{
+  work         w      = {.view = view, .scratch = rm_arena_new(), .out = out};
+  rm_lid      *from   = NULL;
+  remap_status status = w.scratch ? from_least(&w, loop, n, &from) : REMAP_NO_MEMORY;
+
+  out->num = out->num_vertices = 0;
+  if (status == REMAP_OK) status = triangulate(&w, from, n, of);
   if (status == REMAP_OK) status = cut(&w, from, n);
   if (status == REMAP_BAD_MESH) { /* a warped polygon that crosses itself where it is looked at: it stays */
     out->num = out->num_vertices = 0;

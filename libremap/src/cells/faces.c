@@ -278,13 +278,14 @@ static remap_status make_face(work *w, rm_lid k, const rm_lid *loop, rm_lid n)
   return REMAP_OK;
 }
 
-/* A face of polygon k, cut into convex ones if it is concave and that is wanted. */
-static remap_status add_face(work *w, rm_lid k, const rm_lid *loop, rm_lid n, bool split_concave)
+/* A face of pieces, cut into convex ones if it is concave and that is wanted. */
+static remap_status add_face(work *w, const rm_pieces *of, const rm_lid *loop, rm_lid n, bool split_concave)
 {
+  const rm_lid  k    = of->polygon[0];
   const rm_view view = split_concave && n > 3 ? rm_view_of(w->l, w->p->own[k] & 1, w->p->own[k] / 2) : (rm_view){0};
 
   if (!view.l || rm_is_convex(&view, loop, n)) return loop == w->loop ? make_face(w, k, loop, n) : REMAP_OK;
-  RM_TRY(rm_cut_convex(&view, n, loop, &w->parts));
+  RM_TRY(rm_cut_convex(&view, n, loop, of, &w->parts));
   for (int64_t i = 0; i < w->parts.num; i++) {
     const rm_lid first = i ? w->parts.end[i - 1] : 0;
     RM_TRY(make_face(w, k, w->parts.vertex + first, w->parts.end[i] - first));
@@ -309,7 +310,8 @@ static remap_status add_group(work *w, rm_lid k, bool split_concave, bool *one)
   if (!n) return REMAP_OK;
   for (rm_lid i = w->g.offset[group]; i < w->g.offset[group + 1]; i++) w->out->kind[w->g.member[i]] = RM_FACE_NONE;
   if (rm_is_turned(w->glued, k)) reverse(w->loop, n); /* it runs as that of a polygon which is not turned */
-  return add_face(w, k, w->loop, n, split_concave);
+  return add_face(w, &(rm_pieces){w->p, w->g.member + w->g.offset[group], w->g.offset[group + 1] - w->g.offset[group]}, w->loop,
+                  n, split_concave);
 }
 
 static remap_status all_faces(work *w, bool split_concave)
@@ -319,7 +321,8 @@ static remap_status all_faces(work *w, bool split_concave)
 
     if (w->out->kind[k] == RM_FACE_NONE) continue;
     if (w->g.num && w->g.of[k] >= 0 && w->g.member[w->g.offset[w->g.of[k]]] == k) RM_TRY(add_group(w, k, split_concave, &one));
-    if (!one) RM_TRY(add_face(w, k, rm_polygon_loop(w->p, k), rm_polygon_size(w->p, k), split_concave));
+    if (one) continue;
+    RM_TRY(add_face(w, &(rm_pieces){w->p, &k, 1}, rm_polygon_loop(w->p, k), rm_polygon_size(w->p, k), split_concave));
   }
   return REMAP_OK;
 }
