@@ -186,7 +186,8 @@ typedef struct rcgns_boundaries {
 
 /** Which faces of this rank's mesh are on which BC_t: by ranges and lists of faces, elements or vertices; a face is on one of
  *  vertices if all of its own are listed. Where two name one face, the first has it. A condition that is given in another way
- *  (a list of a block at FaceCenter, which does not say across which axis) is left out and noted. Collective. Errors: IO (a list cannot be read), MEMORY. */
+ *  (a list of a block at FaceCenter, which does not say across which axis) is left out and noted. Collective.
+ *  Errors: IO (a list cannot be read), MEMORY. */
 rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgns_message *message);
 
 /** Choose the FlowSolution_t. Collective. choice NULL: the default. *out is a view owned by the file, valid until the next

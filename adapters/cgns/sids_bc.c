@@ -1,8 +1,9 @@
 /* sids_bc -- boundary conditions: which faces of this rank's mesh are on which BC_t.
  *
  * The mesh keeps for each face without neighbour what a file calls it (rc_rim). Conditions are ranges, known from the tree, or
- * lists of indices, element numbers or vertices, which all ranks read in the same pieces, and each looks up its own faces; where faces are elements of their own (TRI_3 and so on) their sections are read first, to
- * learn their numbers. O(rim + boundary elements of the file) on every rank, with no list in memory. */
+ * lists of indices, element numbers or vertices, which all ranks read in the same pieces, and each looks up its own faces;
+ * where faces are elements of their own (TRI_3 and so on) their sections are read first, to learn their numbers.
+ * O(rim + boundary elements of the file) on every rank, with no list in memory. */
 #include "cgns_private.h"
 
 #include <stdio.h>

@@ -376,7 +376,8 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, polys *p, rcgn
   for (int64_t i = 0; i < nodes->key.count && status == RCGNS_OK; i++)
     if (!rc_number_node(file, zone, ((const int64_t *)nodes->key.item)[i])) status = rc_no_memory(message);
   status =
-      rc_nodes_fetch(file, status, zone, nodes->key.item, nodes->key.count, (double *)xyz->item + 3 * xyz->count, NULL, message);
+      rc_nodes_fetch(file, status, zone, nodes->key.item, nodes->key.count, (double *)xyz->item + 3 * xyz->count, NULL,
+                     message);
   if (status == RCGNS_OK) xyz->count += nodes->key.count;
   return status;
 }

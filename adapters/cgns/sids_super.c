@@ -181,8 +181,8 @@ static void put_origins(sheet *s, int64_t parent)
   for (int64_t i = 0; origin && i < f->num; i++) origin[i] = f->word[f->offset[i] + 3];
   put_slice(s, at, "LiesIn", "DataArray_t", "I4", 1, &s->content->mesh->global_faces, f->first, f->first + f->num, origin);
   rc_draft_text(&s->draft, at, "Meaning", "Descriptor_t",
-                "1: in a face of the first ancestors' mesh, 2: of the second ones', 3: of both. That face is the one between the "
-                "ancestors of the cells on both sides.");
+                "1: in a face of the first ancestors' mesh, 2: of the second ones', 3: of both. That face is the one between "
+                "the ancestors of the cells on both sides.");
 }
 
 static void put_elements(sheet *s)

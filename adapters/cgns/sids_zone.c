@@ -271,7 +271,8 @@ static rcgns_status read_sizes(const rcgns_file *file, rc_zone *zone, rcgns_mess
   }
   if (count != 9) return RCGNS_OK;
   for (int d = 0; d < 3; d++) {
-    if (size[d] < 1 || size[d + 3] != size[d] - 1 || __builtin_mul_overflow(product, size[d], &product) || product > RC_TOO_MANY)
+    if (size[d] < 1 || size[d + 3] != size[d] - 1 || __builtin_mul_overflow(product, size[d], &product) ||
+        product > RC_TOO_MANY)
       return rc_fail(message, RCGNS_IO, "%s: zone %s: its sizes are not valid", file->path, zone->name);
     zone->vertices[d] = size[d];
     zone->cells[d]    = size[d + 3];

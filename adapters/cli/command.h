@@ -17,7 +17,7 @@ typedef struct cli_row {
   int         key;             /**< distinct, above every letter */
   char        letter;          /**< 0: it has none */
   const char *name, *argument; /**< what its argument is called, NULL if it takes none */
-  size_t      at; /**< offset in the options of a const char * if there is an argument, else of a bool; CLI_OTHER: take knows */
+  size_t      at;   /**< offset in the options of a const char * if there is an argument, else a bool; CLI_OTHER: see take */
   const char *text; /**< what it does; a second line of help follows after \n */
 } cli_row;
 

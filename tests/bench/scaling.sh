@@ -29,12 +29,13 @@ fields() { tr -d '{}"' <"$work" | tr ':,' '  ' |
 
 echo "One rank at most, N = $largest:"
 echo
-echo "| cells dealt in | ranks | cells per rank | messages | partners | bytes sent | per cell | collectives | bytes into them | peak bytes | per cell | kept | field: messages | bytes |"
+echo "| cells dealt in | ranks | cells per rank | messages | partners | bytes sent | per cell | collectives |" \
+  "bytes into them | peak bytes | per cell | kept | field: messages | bytes |"
 echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 cells=$(fields | awk '{ if ($3 > most) most = $3 } END { print most }')
 fields | awk -v cells="$cells" '$3 == cells { n = $3 / $2
-  printf "| %s | %d | %d | %d | %d | %d | %.0f | %d | %d | %d | %.0f | %d | %d | %d |\n", $1, $2, n, $4, $6, $5, $5 / n, $7, $8, $9, $9 / n,
-    $10, $11, $12 }'
+  printf "| %s | %d | %d | %d | %d | %d | %.0f | %d | %d | %d | %.0f | %d | %d | %d |\n",
+    $1, $2, n, $4, $6, $5, $5 / n, $7, $8, $9, $9 / n, $10, $11, $12 }'
 echo
 echo "Fits to y = a n + b n^(2/3), n cells of both meshes per rank, all N, 2 to 16 ranks P, relative least squares; for bytes"
 echo "that are sent, n is taken (1 - 1/P) times, which is what has to leave its rank:"

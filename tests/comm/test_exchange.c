@@ -92,7 +92,8 @@ static void send_upwards(const rm_comm *comm, int distance, int most)
   rm_arena     *arena       = rm_arena_new();
   int64_t      *send_offset = rm_arena_zero(arena, comm->size + 1, sizeof *send_offset);
   int64_t      *recv_offset = rm_arena_zero(arena, comm->size + 1, sizeof *recv_offset);
-  const int     to = (comm->rank + distance) % comm->size, from = (comm->rank + comm->size - distance % comm->size) % comm->size;
+  const int     to   = (comm->rank + distance) % comm->size;
+  const int     from = (comm->rank + comm->size - distance % comm->size) % comm->size;
   const int64_t send[2] = {comm->rank, distance};
   void         *recv    = NULL;
 
@@ -337,7 +338,8 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
 
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
         RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(exchanges_that_follow_each_other_at_once_stay_apart),
-        RT_CASE(only_those_who_have_something_to_say_send_anything), RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
+        RT_CASE(only_those_who_have_something_to_say_send_anything),
+        RT_CASE(a_rank_without_memory_stops_the_exchange_everywhere),
         RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
         RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders),
         RT_CASE(who_says_something_else_is_apart_from_its_peers), RT_CASE(only_neighbours_take_part_in_a_plan),

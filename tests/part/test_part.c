@@ -399,7 +399,8 @@ static void check_even_cuts(world *w)
 
     RT_CHECK(i == 0 || cuts.key[i - 1] <= cuts.key[i]);
     RT_CHECK(below <= goal + slack);
-    if (below < goal - slack) RT_CHECK(cells_below(w, &zone_frame, cuts.key[i] + 1) > goal); /* cells of one key stay together */
+    if (below < goal - slack) /* cells of one key stay together */
+      RT_CHECK(cells_below(w, &zone_frame, cuts.key[i] + 1) > goal);
   }
 }
 

@@ -74,7 +74,8 @@ for dir in libremap/src/*/; do
     esac
   done >>"$failures"
   # shellcheck disable=SC2086
-  includes $files | awk -F'\t' '$2 ~ /hdf5|cgns|jansson|gmp/ { print $1 " includes " $2 ": the core needs MPI alone" }' >>"$failures"
+  includes $files |
+    awk -F'\t' '$2 ~ /hdf5|cgns|jansson|gmp/ { print $1 " includes " $2 ": the core needs MPI alone" }' >>"$failures"
   if [ "$room" != comm ]; then
     # shellcheck disable=SC2086
     plain $files | grep -E '\bMPI_[A-Z][A-Za-z0-9_]*[ ]*\(' | sed 's/$/   <- only comm calls MPI/' >>"$failures" || true

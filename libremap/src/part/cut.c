@@ -139,8 +139,8 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   return REMAP_OK;
 }
 
-/* The ranges with open cuts, each divided by WAYS - 1 probes: how many cells of this rank lie below these. Returns the number of
- * ranges. */
+/* The ranges with open cuts, each divided by WAYS - 1 probes: how many cells of this rank lie below these. Returns how many
+ * ranges there are. */
 static int probe(search *s)
 {
   int64_t at  = 0;

@@ -154,7 +154,7 @@ static void rows_longer_than_slices_are_found_too(void)
   }
 }
 
-/* Open a file whose row r has another head: the message names that row, or what is missing at the end, on any number of ranks. */
+/* Open a file whose row r has another head: the message names that row, or what is missing at the end, on any ranks. */
 static void check_damage(section *s, int64_t row, int64_t head)
 {
   const int64_t kept = s->row[s->offset[row]];

@@ -103,7 +103,8 @@ value() { "$tools/json_value" "$work/report.json" "$@"; }
 # near A B BY: two numbers agree within BY of the larger one.
 near() {
   awk -v a="$1" -v b="$2" -v by="$3" 'function mag(x) { return x < 0 ? -x : x }
-    BEGIN { most = mag(a) > mag(b) ? mag(a) : mag(b); exit !(mag(a - b) <= by * most) }' || complain "$1 and $2 differ by more than $3"
+    BEGIN { most = mag(a) > mag(b) ? mag(a) : mag(b); exit !(mag(a - b) <= by * most) }' ||
+    complain "$1 and $2 differ by more than $3"
 }
 
 # Lets the script end.
