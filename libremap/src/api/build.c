@@ -196,8 +196,19 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
   return REMAP_OK;
 }
 
+/* Read meshes that are new, as rm_context_read_meshes; what only that needs ends with it. Collective. */
+static remap_status read_meshes(remap_context *ctx, bool is_new[2], rm_reason *reason)
+{
+  rm_arena    *passing = rm_arena_new();
+  remap_status status  = stage(ctx, passing ? REMAP_OK : REMAP_NO_MEMORY, reason);
+
+  if (status == REMAP_OK) status = rm_context_read_meshes(ctx, is_new, passing, reason);
+  rm_arena_drop(passing);
+  return status;
+}
+
 /* The overlay of meshes that move or are new, which are read again, and of others, which are as they were. Collective. */
-static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, rm_arena *passing, rm_reason *reason)
+static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, rm_reason *reason)
 {
   int64_t         crossings = 0;
   rm_zone_overlap zones[2];
@@ -205,8 +216,8 @@ static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, r
   const double    start = rm_seconds();
   double          seconds, magnitude[2];
 
-  RM_TRY(rm_context_read_meshes(ctx, is_new, passing, reason));
-  RM_TRY(rm_context_place(ctx, is_new, keeps, passing, reason));
+  RM_TRY(read_meshes(ctx, is_new, reason));
+  RM_TRY(rm_context_place(ctx, is_new, keeps, reason));
   RM_TRY(find_magnitudes(ctx, magnitude));
   seconds = rm_seconds() - start;
   for (int side = 0; side < 2; side++) RM_TRY(find_zone_overlap(ctx, side, magnitude[side], &zones[side], reason));
@@ -221,7 +232,6 @@ static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, r
 /* Drop what rests on the last overlay and make a new one. keeps: the next one may use what this one can. Collective. */
 static remap_status build_anew(remap_context *ctx, const bool moves[2], bool keeps, rm_reason *reason)
 {
-  rm_arena    *passing = rm_arena_new();
   remap_status status;
 
   rm_context_drop_carriers(ctx);
@@ -234,9 +244,8 @@ static remap_status build_anew(remap_context *ctx, const bool moves[2], bool kee
   ctx->is_built = false;
   memset(&ctx->stats, 0, sizeof ctx->stats);
   ctx->seconds_transfer = 0;
-  status                = stage(ctx, ctx->arena && passing ? REMAP_OK : REMAP_NO_MEMORY, reason);
-  if (status == REMAP_OK) status = build(ctx, moves, keeps, passing, reason);
-  rm_arena_drop(passing);
+  status                = stage(ctx, ctx->arena ? REMAP_OK : REMAP_NO_MEMORY, reason);
+  if (status == REMAP_OK) status = build(ctx, moves, keeps, reason);
   ctx->is_built = status == REMAP_OK;
   if (!ctx->is_built || !keeps) rm_context_drop_place(ctx);
   for (int d = 0; d < 2; d++) ctx->masked[d] = ctx->mapping;

@@ -57,7 +57,6 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
   }
   remap_options_default(ctx ? &ctx->options : NULL);
   if (ctx && options) ctx->options = *options;
-  if (ctx) ctx->slicing = (rm_slicing){RM_ROUND_TRIANGLES, RM_ROUND_REPEATS};
   if (status == REMAP_OK && !options_are_good(&ctx->options)) status = REMAP_BAD_ARGUMENT;
   if (status == REMAP_OK && !rm_geom_selftest()) status = REMAP_INTERNAL;
   const remap_status duplicated = rm_comm_dup(comm, &own);
@@ -78,6 +77,7 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
     (void)rm_comm_max_i64(&own, unused, 8);
   }
   if (ctx) ctx->comm = own;
+  if (ctx) ctx->slicing = own.size > 1 ? rm_one_block : (rm_slicing){RM_ROUND_TRIANGLES, RM_ROUND_REPEATS};
   if (status == REMAP_OK) status = rm_context_meet_few(ctx);
   status = rm_comm_agree(&own, status, NULL);
   if (status != REMAP_OK) {

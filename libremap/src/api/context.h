@@ -28,9 +28,10 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
-/* What is overlaid at once at most: about 16,000 hexahedra of either mesh, for which the overlay takes 40 MB with diagonal
- * faces, 90 MB with centres. */
-enum { RM_ROUND_TRIANGLES = 400000 };
+/* What one rank alone overlays at once at most: about 4000 hexahedra of either mesh, for which the overlay takes 15 MB with
+ * diagonal faces, 25 MB with centres; and how many triangles may come twice for that. Several ranks would wait for each other in
+ * every round, by a tenth and more of the whole: they have one. */
+enum { RM_ROUND_TRIANGLES = 100000 };
 #define RM_ROUND_REPEATS 0.5
 
 /* Calls that all ranks make together, or among neighbours. */
@@ -127,8 +128,8 @@ remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena
 
 /* Choose where the cells of both meshes are overlaid, in how many rounds (rm_part_rounds), one if the place is to be kept; if
  * it is one, bring them there, unless they are there already: is_new[side], the mesh is not as it was at the last call.
- * Collective. What is not kept lives in passing. TOO_LARGE, NO_MEMORY. */
-remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_arena *passing, rm_reason *reason);
+ * Collective. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_reason *reason);
 
 /* Bring the cells of a round there, if there are several, in place of those of the last. Collective. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_place_round(remap_context *ctx, int round, rm_reason *reason);

@@ -68,44 +68,58 @@ static double choose_margin(const remap_context *ctx, double approach, int num_m
   return 4 * pace > size ? 0 : fmin(MOVES_AHEAD * pace, size / 2);
 }
 
-/* Room for a new choice, and the boxes of now. Not collective. */
-static remap_status open_place(remap_context *ctx, double margin, rm_arena *passing, rm_mesh *widened)
+/* Room for a new choice, and the boxes of now if it is to be kept. Not collective. */
+static remap_status open_place(remap_context *ctx, double margin, bool keeps)
 {
   rm_place *place = &ctx->place;
   double(*box)[6];
-  const rm_mesh *target = ctx->mesh[REMAP_TARGET];
 
   place->arena  = rm_arena_new();
   place->margin = margin;
   if (!place->arena) return REMAP_NO_MEMORY;
-  for (int side = 0; side < 2; side++) {
+  for (int side = 0; side < 2 && keeps; side++) {
     RM_NEW(box, place->arena, ctx->mesh[side]->num_cells);
     if (ctx->mesh[side]->num_cells > 0)
       memcpy(box, ctx->mesh[side]->cell_box, (size_t)ctx->mesh[side]->num_cells * sizeof *box);
     place->box[side] = (const double(*)[6])box;
   }
+  return REMAP_OK;
+}
+
+/* The target's cells with wider boxes. Not collective. */
+static remap_status widen(const remap_context *ctx, double margin, rm_arena *passing, rm_mesh *widened)
+{
+  const rm_mesh *target = ctx->mesh[REMAP_TARGET];
+  double(*box)[6];
+
+  *widened = *target;
+  if (!(margin > 0)) return REMAP_OK;
   RM_NEW(box, passing, target->num_cells);
   for (rm_lid c = 0; c < target->num_cells; c++)
     for (int k = 0; k < 6; k++) box[c][k] = target->cell_box[c][k] + (k < 3 ? -margin : margin);
-  *widened          = *target;
   widened->cell_box = (const double(*)[6])box;
   return REMAP_OK;
 }
 
 /* Choose routes. Collective. */
-static remap_status choose_routes(remap_context *ctx, double margin, bool keeps, rm_arena *passing, rm_reason *reason)
+static remap_status choose_routes(remap_context *ctx, double margin, bool keeps, rm_reason *reason)
 {
+  rm_arena      *passing = rm_arena_new();
   rm_mesh        widened;
   const rm_mesh *mesh[2] = {ctx->mesh[REMAP_SOURCE], &widened};
   const rm_zone *zone;
+  remap_status   status = passing ? widen(ctx, margin, passing, &widened) : REMAP_NO_MEMORY;
 
   rm_context_drop_place(ctx);
-  RM_TRY(rm_comm_agree(&ctx->comm, open_place(ctx, margin, passing, &widened), NULL));
-  RM_TRY(rm_zone_build(passing, &ctx->comm, mesh, &zone));
-  RM_TRY(rm_part_plan(ctx->place.arena, &ctx->comm, &ctx->frame, mesh, zone, keeps ? &rm_one_block : &ctx->slicing,
-                      &ctx->place.routes, reason));
+  if (status == REMAP_OK) status = open_place(ctx, margin, keeps);
+  RM_GOTO(done, status = rm_comm_agree(&ctx->comm, status, NULL));
+  RM_GOTO(done, status = rm_zone_build(passing, &ctx->comm, mesh, &zone));
+  status           = rm_part_plan(ctx->place.arena, &ctx->comm, &ctx->frame, mesh, zone, keeps ? &rm_one_block : &ctx->slicing,
+                                  &ctx->place.routes, reason);
   ctx->place.frame = ctx->frame;
-  return REMAP_OK;
+done:
+  rm_arena_drop(passing);
+  return status;
 }
 
 /* Do routes hold for the meshes as they are now? If not, *margin is for new ones. Collective. */
@@ -137,13 +151,13 @@ static remap_status send_piece(remap_context *ctx, int side, int round, rm_reaso
                       reason);
 }
 
-remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_arena *passing, rm_reason *reason)
+remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_reason *reason)
 {
   bool   hold;
   double margin;
 
   RM_TRY(try_routes(ctx, &hold, &margin));
-  if (!hold) RM_TRY(choose_routes(ctx, margin, keeps, passing, reason));
+  if (!hold) RM_TRY(choose_routes(ctx, margin, keeps, reason));
   if (hold && memcmp(&ctx->place.frame, &ctx->frame, sizeof ctx->frame)) { /* triangles are in order along its curve */
     ctx->place.frame = ctx->frame;
     for (int side = 0; side < 2; side++) rm_context_drop_triangles(ctx, side);
