@@ -88,9 +88,8 @@ remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trim
 /* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
  * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH
  * with the cell and the reason if cells of one mesh overlap or cross each other; TOO_LARGE from 2^30 polygons on. The meshes
- * of the overlay are those of rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but
- * not its meshes: it is dropped, and NULL then, as soon as it is used up. O(n log n) in crossings, n^2 in the vertices of a
- * face with holes. */
+ * of the overlay are those of rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but not its meshes:
+ * it is dropped, and NULL then, as soon as it is used up. O(n log n). */
 remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason);
 

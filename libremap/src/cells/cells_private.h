@@ -109,6 +109,16 @@ int rm_turn(const rm_view *v, rm_lid p, rm_lid q, rm_lid r);
 /* Sign of p's coordinate less q's on an axis. Exact. */
 int rm_compare(const rm_limit *l, rm_lid p, rm_lid q, int axis);
 
+/* ---- where arcs lie in the other mesh ---------------------------------------------------------------------------- */
+
+/* True if both spots lie on one edge of triangle t of mesh `side`. */
+bool rm_both_on_edge(const rm_limit *l, int side, rm_lid t, rm_lid p, rm_lid q);
+/* A present triangle of mesh `side` on which both spots lie, and an edge of it on which they do, -1; false if there is none. */
+bool rm_carrier(const rm_limit *l, int side, rm_lid p, rm_lid q, rm_lid *triangle, rm_lid *edge);
+/* What lies left of the arc from p to q in triangle t of mesh `side`, which runs along edge f of the other mesh: the triangle
+ * on which the polygon there lies, or -1 and the cell. False if there is nothing around f. */
+bool rm_place_left(const rm_limit *l, int side, rm_lid t, rm_lid p, rm_lid q, rm_lid f, rm_lid *triangle, rm_lid *cell);
+
 /* ---- polygons ---------------------------------------------------------------------------------------------------- */
 
 typedef struct rm_label {
@@ -155,6 +165,27 @@ static inline rm_label rm_polygon_label(const rm_limit *l, const rm_polygons *p,
 /* Every polygon of the supermesh. lines are the arenas of l->lines: dropped, and NULL then, one after the other. BAD_MESH with
  * cell and reason if the meshes are not embedded, TOO_LARGE from 2^30 polygons on. O(a log a) for the arcs of a triangle. */
 remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_arena *lines[2], rm_polygons *out, rm_reason *reason);
+
+/* A line that sweeps over a plane graph, see sweep.c. */
+typedef struct rm_sweep {
+  const rm_view *view;
+  const rm_lid (*end)[2]; /* of edges: left spot, right spot                        */
+  rm_lid        *list;    /* [num] edges that the line meets, from below; the caller's room */
+  rm_lid         num;
+} rm_sweep;
+/* -1, 0, +1 as the line is at spot p before q, is at both, at p after q. Exact. */
+int rm_sweep_compare(const rm_view *view, rm_lid p, rm_lid q);
+/* list[n] in scratch: the numbers of n spots from left to right; equal ones stay as they are. NO_MEMORY. */
+remap_status rm_sweep_order(rm_arena *scratch, const rm_view *view, rm_lid n, const rm_lid *spot, rm_lid **list);
+/* The highest edge below a spot that the line is at, -1. */
+rm_lid rm_sweep_below(const rm_sweep *s, rm_lid p);
+/* The line, at the left end of an edge, begins to meet it. */
+void rm_sweep_insert(rm_sweep *s, rm_lid edge);
+/* The line, at the right end of an edge, leaves it; false if it is not there: edges cross. */
+bool rm_sweep_remove(rm_sweep *s, rm_lid edge);
+/* below[k]: the highest edge below spot query[k], -1, among edges of a plane graph. BAD_MESH if they cross, NO_MEMORY. */
+remap_status rm_edges_below(rm_arena *scratch, const rm_view *view, rm_lid num_edges, const rm_lid (*edge)[2], rm_lid num,
+                            const rm_lid *query, rm_lid *below);
 
 /* The region inside loop[0] and outside the others, as triangles: corner gets three spots each, *num their number. Loops are
  * offset[num_loops + 1] into spot; the first runs counter-clockwise, the others clockwise. NO_MEMORY, BAD_MESH. */

@@ -9,6 +9,7 @@
  * of a triangle. */
 #include "cells/cells_private.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,8 +28,8 @@ typedef struct arc {
 } arc;
 
 typedef struct cycle {
-  rm_lid half, num, state, component, inside; /* inside: the cycle whose hole it is, -1 */
-  double area;
+  rm_lid half, num, state, inside; /* inside: the cycle whose hole it is, -1 */
+  rm_lid first_hole, next_hole;    /* the holes in it; the next one in the same cycle; -1 */
   bool   simple; /* it has no vertex twice */
 } cycle;
 
@@ -119,49 +120,6 @@ static remap_status add_arc(work *w, rm_lid from, rm_lid to, rm_lid left, rm_lid
   return REMAP_OK;
 }
 
-static bool both_on_edge(const work *w, int side, rm_lid t, rm_lid p, rm_lid q)
-{
-  const rm_lid *e = w->l->mesh[side]->triangle_edge[t];
-
-  for (int h = 0; h < 3; h++)
-    if (rm_on_edge(w->l, side, p, e[h]) && rm_on_edge(w->l, side, q, e[h])) return true;
-  return false;
-}
-
-/* A present triangle of mesh `side` on which both spots lie, and an edge of it on which they do, -1; false if there is none. */
-static bool carrier(const work *w, int side, rm_lid p, rm_lid q, rm_lid *triangle, rm_lid *edge)
-{
-  const rm_trimesh *m = w->l->mesh[side];
-  const rm_feature  f = w->l->spot[p].at[side], g = w->l->spot[q].at[side];
-  rm_lid            first = 0, last = 1;
-
-  *triangle = *edge = -1;
-  if (f.kind == RM_ON_NOTHING || g.kind == RM_ON_NOTHING) return false;
-  if (f.kind == RM_ON_TRIANGLE) {
-    *triangle = rm_in_triangle(w->l, side, g, f.id) && rm_is_present(w->l, side, f.id) ? f.id : -1;
-    return *triangle >= 0;
-  }
-  if (f.kind == RM_ON_VERTEX) first = m->vertex_edge_offset[f.id], last = m->vertex_edge_offset[f.id + 1];
-  for (rm_lid k = first; k < last; k++) {
-    const rm_lid e = f.kind == RM_ON_VERTEX ? m->vertex_edge[k] : f.id;
-    for (rm_lid z = m->star_offset[e]; z < m->star_offset[e + 1]; z++) {
-      const rm_lid t = w->l->first_copy[side][m->star[z] / 4];
-      if (!rm_is_present(w->l, side, t)) continue;
-      if (rm_on_edge(w->l, side, q, e)) {
-        *edge = e, *triangle = t;
-        return true;
-      }
-      if (*triangle < 0 && rm_in_triangle(w->l, side, g, t)) *triangle = t;
-    }
-  }
-  if (*triangle >= 0) /* the common edge may be the one across the vertex */
-    for (int h = 0; h < 3; h++) {
-      const rm_lid e = m->triangle_edge[*triangle][h];
-      if (rm_on_edge(w->l, side, p, e) && rm_on_edge(w->l, side, q, e)) *edge = e;
-    }
-  return *triangle >= 0;
-}
-
 static remap_status boundary(work *w)
 {
   const rm_trimesh *m = w->l->mesh[w->side];
@@ -177,7 +135,7 @@ static remap_status boundary(work *w)
       const rm_lid k = first + (h == 2 ? n - i : i);
       const rm_lid p = k > first ? lines->spot[k - 1] : end[0], q = k < first + n ? lines->spot[k] : end[1];
       rm_lid       at = k > first ? lines->state[k - 1] : lines->start[e], triangle, edge;
-      if (carrier(w, other_side(w), p, q, &triangle, &edge)) at = RM_UNKNOWN;
+      if (rm_carrier(w->l, other_side(w), p, q, &triangle, &edge)) at = RM_UNKNOWN;
       if (at < RM_OUTSIDE) return tangled(w);
       RM_TRY(h == 2 ? add_arc(w, q, p, at, OUTER) : add_arc(w, p, q, at, OUTER));
     }
@@ -200,8 +158,8 @@ static remap_status segments(work *w)
 
   for (rm_lid k = w->segment_offset[w->t]; k < w->segment_offset[w->t + 1]; k++) {
     const rm_segment *s = &w->segment[k];
-    if (both_on_edge(w, w->side, w->t, s->p, s->q)) continue;
-    const bool    along = both_on_edge(w, other_side(w), s->other, s->p, s->q);
+    if (rm_both_on_edge(w->l, w->side, w->t, s->p, s->q)) continue;
+    const bool    along = rm_both_on_edge(w->l, other_side(w), s->other, s->p, s->q);
     const rm_lid *cell  = l->cell[other_side(w)][s->other];
     RM_TRY(push_arc(w, (arc){s->p, s->q, along ? RM_UNKNOWN : cell[0], along ? RM_UNKNOWN : cell[1]}));
   }
@@ -252,7 +210,7 @@ static remap_status edges_in_plane(work *w)
   qsort(w->touch, (size_t)w->num_touches, sizeof *w->touch, by_edge);
   for (rm_lid k = 0; k + 1 < w->num_touches; k++) {
     const edge_spot a = w->touch[k], b = w->touch[k + 1];
-    if (a.edge != b.edge || both_on_edge(w, w->side, w->t, a.spot, b.spot) || !edge_is_present(w, other_side(w), a.edge))
+    if (a.edge != b.edge || rm_both_on_edge(w->l, w->side, w->t, a.spot, b.spot) || !edge_is_present(w, other_side(w), a.edge))
       continue;
     RM_TRY(push_arc(w, (arc){a.spot, b.spot, RM_UNKNOWN, RM_UNKNOWN}));
   }
@@ -267,71 +225,7 @@ static int by_ends(const void *a, const void *b)
   return (x->left > y->left) - (x->left < y->left);
 }
 
-/* ---- around an edge of the other mesh ---------------------------------------------------------------------------- */
-
-/* A corner of the triangle on the left of the line from a to b in its plane. */
-static const double *corner_left_of(const work *w, const double a[3], const double b[3])
-{
-  const rm_trimesh *m = w->l->mesh[w->side];
-  const rm_lid     *v = m->triangle[w->t];
-  double            o[3];
-
-  rm_off_plane(m->vertex[v[0]], m->vertex[v[1]], m->vertex[v[2]], o);
-  for (int h = 0; h < 3; h++)
-    if (rm_orient3d(a, b, m->vertex[v[h]], o) > 0) return m->vertex[v[h]];
-  return NULL;
-}
-
-/* True if x and y, in one plane with the line f0 f1, are on the same side of it. */
-static bool same_side(const double f0[3], const double f1[3], const double x[3], const double y[3])
-{
-  double o[3];
-  return rm_off_plane(f0, f1, x, o) && rm_orient3d(o, f0, f1, x) == rm_orient3d(o, f0, f1, y);
-}
-
-/* The half-plane from f to x among the triangles of the other mesh around edge f: the triangle it lies in, or the cell. */
-static bool place_around(const work *w, rm_lid f, const double x[3], rm_lid *triangle, rm_lid *cell)
-{
-  const rm_trimesh *m = w->l->mesh[other_side(w)];
-  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]], *nearest = NULL;
-  int               nearest_quarter = 0;
-
-  *triangle = -1;
-  for (rm_lid z = m->star_offset[f]; z < m->star_offset[f + 1]; z++) {
-    const rm_lid  b = m->star[z] / 4;
-    const int     h = m->star[z] & 3;
-    const double *y = m->vertex[m->triangle[b][h == 0 ? 2 : h == 1 ? 0 : 1]];
-    int           quarter;
-
-    if (!rm_is_present(w->l, other_side(w), b)) continue;
-    const int s = rm_orient3d(f0, f1, x, y);
-    if (s == 0 && same_side(f0, f1, x, y)) {
-      *triangle = b;
-      return true;
-    }
-    quarter = s > 0 ? 0 : s == 0 ? 1 : 2;
-    if (nearest && (quarter > nearest_quarter || (quarter == nearest_quarter && rm_orient3d(f0, f1, y, nearest) <= 0)))
-      continue;
-    nearest         = y;
-    nearest_quarter = quarter;
-    *cell           = w->l->cell[other_side(w)][b][h == 2 ? 1 : 0]; /* the side that is met first, turning about f */
-  }
-  return nearest != NULL;
-}
-
-/* What lies left of the arc from p to q, which runs along edge f of the other mesh: the triangle on which the polygon there
- * lies, or the cell. False if there is nothing around f. */
-static bool place_left(const work *w, rm_lid p, rm_lid q, rm_lid f, rm_lid *triangle, rm_lid *cell)
-{
-  const rm_trimesh *m = w->l->mesh[other_side(w)];
-  const double     *f0 = m->vertex[m->edge[f][0]], *f1 = m->vertex[m->edge[f][1]];
-  int               sign = 0;
-
-  for (int k = 0; k < 3 && !sign; k++) /* the direction of the arc along f */
-    if (f0[k] != f1[k]) sign = rm_compare(w->l, q, p, k) * (f1[k] > f0[k] ? 1 : -1);
-  const double *x = sign > 0 ? corner_left_of(w, f0, f1) : corner_left_of(w, f1, f0);
-  return x && place_around(w, f, x, triangle, cell);
-}
+/* ---- arcs inside the triangle ------------------------------------------------------------------------------------ */
 
 /* An arc along an edge of the other mesh: the cells beside it. Separates is false where the other mesh only touches the
  * triangle there, with one cell on both sides. */
@@ -339,8 +233,9 @@ static remap_status place_arc(work *w, arc *a, bool *separates)
 {
   rm_lid triangle[2] = {-1, -1}, cell[2] = {RM_UNKNOWN, RM_UNKNOWN}, ignored, f;
 
-  if (!carrier(w, other_side(w), a->from, a->to, &ignored, &f) || f < 0) return tangled(w);
-  if (!place_left(w, a->from, a->to, f, &triangle[0], &cell[0]) || !place_left(w, a->to, a->from, f, &triangle[1], &cell[1]))
+  if (!rm_carrier(w->l, other_side(w), a->from, a->to, &ignored, &f) || f < 0) return tangled(w);
+  if (!rm_place_left(w->l, w->side, w->t, a->from, a->to, f, &triangle[0], &cell[0]) ||
+      !rm_place_left(w->l, w->side, w->t, a->to, a->from, f, &triangle[1], &cell[1]))
     return tangled(w);
   if (triangle[0] < 0) a->left = cell[0];
   if (triangle[1] < 0) a->right = cell[1];
@@ -456,7 +351,7 @@ static remap_status walk_cycles(work *w)
   for (rm_lid k = 0; k < w->num_nodes; k++) seen[k] = -1;
   w->num_cycles = 0;
   for (rm_lid first = 0; first < w->num_halves; first++) {
-    cycle  c = {first, 0, RM_UNKNOWN, 0, -1, 0, true};
+    cycle  c = {first, 0, RM_UNKNOWN, -1, -1, -1, true};
     rm_lid h = first;
 
     if (w->half[first].cycle != NOT_CALLED) continue;
@@ -486,31 +381,91 @@ static rm_lid root(rm_lid *parent, rm_lid k)
   return k;
 }
 
-/* True if spot p is inside a cycle that it is not on: crossings of the ray from it along the view's first axis. Exact. */
-static bool is_inside(const work *w, rm_lid p, rm_lid first)
-{
-  const rm_limit *l = w->l;
-  bool            inside = false;
-  rm_lid          h = first;
+/* A part of the graph apart from the boundary. */
+typedef struct island {
+  rm_lid root;  /* node                                           */
+  rm_lid first; /* spot that a line from the left comes to first  */
+  rm_lid shore; /* the cycle around it                            */
+} island;
 
-  do {
-    const rm_lid a = w->spot[w->half[h].from], b = w->spot[end_of(w, h)];
-    const bool   above_a = rm_compare(l, a, p, w->view.y) > 0, above_b = rm_compare(l, b, p, w->view.y) > 0;
-    if (above_a != above_b) {
-      const int turn = w->view.flip * rm_turn(&w->view, a, b, p); /* counter-clockwise in the axes */
-      if (above_b ? turn > 0 : turn < 0) inside = !inside;
-    }
-    h = w->half[h].next;
-  } while (h != first);
-  return inside;
+/* The islands, in the order in which a line from the left comes to them; of[node] is the island of a root, -1. */
+static remap_status find_islands(work *w, rm_arena *arena, const rm_lid *parent, rm_lid num, island **out, rm_lid *of)
+{
+  island *list, *sorted;
+  rm_lid *first, *order;
+  double *area;
+
+  RM_NEW(list, arena, num);
+  RM_NEW(sorted, arena, num);
+  RM_NEW(first, arena, num);
+  RM_NEW(area, arena, num);
+  num = 0;
+  for (rm_lid k = 0; k < w->num_nodes; k++) {
+    of[k] = k && parent[k] == k ? num : -1;
+    if (of[k] >= 0) area[num] = INFINITY, list[num++] = (island){k, w->spot[k], -1};
+  }
+  for (rm_lid k = 0; k < w->num_nodes; k++) {
+    island *x = parent[k] ? &list[of[parent[k]]] : NULL;
+    if (x && rm_sweep_compare(&w->view, w->spot[k], x->first) < 0) x->first = w->spot[k];
+  }
+  for (rm_lid c = 0; c < w->num_cycles; c++) { /* the one that runs clockwise */
+    const rm_lid x = of[parent[w->half[w->cycle[c].half].from]];
+    const double a = x >= 0 ? cycle_area(w, w->cycle[c].half) : 0;
+    if (x >= 0 && a < area[x]) area[x] = a, list[x].shore = c;
+  }
+  for (rm_lid k = 0; k < num; k++) first[k] = list[k].first;
+  RM_TRY(rm_sweep_order(arena, &w->view, num, first, &order));
+  for (rm_lid k = 0; k < num; k++) sorted[k] = list[order[k]], of[sorted[k].root] = k;
+  *out = sorted;
+  return REMAP_OK;
 }
 
-/* The cycle around each part of the graph apart from the boundary is a hole of the smallest polygon that it lies in. */
-static remap_status find_holes(work *w, bool *any)
+/* The cycle above arc k. */
+static rm_lid cycle_above(const work *w, rm_lid k)
 {
-  rm_lid *parent;
+  const rm_lid h = 2 * k;
+  return w->half[rm_sweep_compare(&w->view, w->spot[w->half[h].from], w->spot[end_of(w, h)]) < 0 ? h : h + 1].cycle;
+}
 
-  *any = false;
+/* Each island is a hole of the polygon above the edge that is below its first spot; if that is another's shore, it is in the
+ * same polygon. */
+static remap_status place_islands(work *w, rm_arena *arena, const island *list, rm_lid num)
+{
+  const rm_lid arcs = w->num_halves / 2;
+  rm_lid     (*edge)[2], *query, *below;
+
+  RM_NEW(edge, arena, arcs);
+  RM_NEW(query, arena, num);
+  RM_NEW(below, arena, num);
+  for (rm_lid k = 0; k < arcs; k++)
+    for (int h = 0; h < 2; h++) edge[k][h] = w->spot[w->half[2 * k + h].from];
+  for (rm_lid k = 0; k < num; k++) {
+    query[k]                        = list[k].first;
+    w->cycle[list[k].shore].inside = w->num_cycles; /* not known yet */
+  }
+  remap_status status = rm_edges_below(arena, &w->view, arcs, (const rm_lid (*)[2])edge, num, query, below);
+  if (status == REMAP_BAD_MESH) return tangled(w);
+  RM_TRY(status);
+  for (rm_lid k = 0; k < num; k++) {
+    cycle *hole   = &w->cycle[list[k].shore];
+    rm_lid around = below[k] < 0 ? -1 : cycle_above(w, below[k]);
+
+    if (around >= 0 && w->cycle[around].inside >= 0) around = w->cycle[around].inside;
+    if (around < 0 || around == w->num_cycles) return tangled(w);
+    hole->inside                = around;
+    hole->next_hole             = w->cycle[around].first_hole;
+    w->cycle[around].first_hole = list[k].shore;
+    if (w->cycle[around].state == RM_UNKNOWN) w->cycle[around].state = hole->state;
+  }
+  return REMAP_OK;
+}
+
+/* The cycle around each part of the graph apart from the boundary is a hole of the polygon that it lies in. */
+static remap_status find_holes(work *w)
+{
+  rm_lid *parent, *of, num = 0;
+  island *list;
+
   parent = w->component;
   for (rm_lid k = 0; k < w->num_nodes; k++) parent[k] = k;
   for (rm_lid h = 0; h < w->num_halves; h += 2) {
@@ -518,32 +473,16 @@ static remap_status find_holes(work *w, bool *any)
     if (a < b) parent[b] = a;
     else parent[a] = b;
   }
-  for (rm_lid k = 0; k < w->num_nodes; k++) *any = *any || root(parent, k) != 0;
-  if (!*any) return REMAP_OK;
-  for (rm_lid c = 0; c < w->num_cycles; c++) {
-    w->cycle[c].component = root(parent, w->half[w->cycle[c].half].from);
-    w->cycle[c].area      = cycle_area(w, w->cycle[c].half);
-  }
-  for (rm_lid k = 1; k < w->num_nodes; k++) {
-    rm_lid hole = -1;
-    if (parent[k] != k) continue;
-    for (rm_lid c = 0; c < w->num_cycles; c++)
-      if (w->cycle[c].component == k && (hole < 0 || w->cycle[c].area < w->cycle[hole].area)) hole = c;
-    w->cycle[hole].inside = w->num_cycles;
-  }
-  for (rm_lid hole = 0; hole < w->num_cycles; hole++) {
-    rm_lid around = -1;
-    if (w->cycle[hole].inside < 0) continue;
-    for (rm_lid c = 0; c < w->num_cycles; c++) {
-      if (w->cycle[c].inside >= 0 || w->cycle[c].component == w->cycle[hole].component) continue;
-      if (around >= 0 && w->cycle[c].area >= w->cycle[around].area) continue;
-      if (is_inside(w, w->spot[w->half[w->cycle[hole].half].from], w->cycle[c].half)) around = c;
-    }
-    if (around < 0) return tangled(w);
-    w->cycle[hole].inside = around;
-    if (w->cycle[around].state == RM_UNKNOWN) w->cycle[around].state = w->cycle[hole].state;
-  }
-  return REMAP_OK;
+  for (rm_lid k = 1; k < w->num_nodes; k++) num += root(parent, k) == k;
+  if (!num) return REMAP_OK;
+  for (rm_lid k = 1; k < w->num_nodes; k++) parent[k] = root(parent, k);
+
+  rm_arena    *arena  = rm_arena_new();
+  remap_status status = arena && (of = rm_arena_alloc(arena, w->num_nodes, sizeof *of)) ? REMAP_OK : REMAP_NO_MEMORY;
+  if (status == REMAP_OK) status = find_islands(w, arena, parent, num, &list, of);
+  if (status == REMAP_OK) status = place_islands(w, arena, list, num);
+  rm_arena_drop(arena);
+  return status;
 }
 
 /* ---- where a polygon lies in the other mesh ---------------------------------------------------------------------- */
@@ -556,8 +495,8 @@ static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *st
   rm_lid            b, f;
 
   *triangle = -1;
-  if (!carrier(w, other_side(w), p, q, &b, &f)) return tangled(w);
-  if (f >= 0) return place_left(w, p, q, f, triangle, state) ? REMAP_OK : tangled(w);
+  if (!rm_carrier(w->l, other_side(w), p, q, &b, &f)) return tangled(w);
+  if (f >= 0) return rm_place_left(w->l, w->side, w->t, p, q, f, triangle, state) ? REMAP_OK : tangled(w);
   /* the arc runs through the inside of b: along an edge of this triangle, whose far corner is off that edge */
   for (int h = 0; h < 3; h++) {
     const rm_lid e = own->triangle_edge[w->t][h];
@@ -618,36 +557,42 @@ static remap_status push_loop(work *w, const cycle *c, rm_polygons *to)
   return REMAP_OK;
 }
 
+/* Its loops, the outer one first, and the triangles. */
+static remap_status cut_loops(work *w, rm_arena *arena, rm_lid around, rm_polygons *loops, rm_lid **corner, int64_t *num)
+{
+  int64_t *offset;
+  int      n = 0;
+
+  RM_NEW(offset, arena, (int64_t)w->num_cycles + 1);
+  for (rm_lid c = around; c >= 0; c = c == around ? w->cycle[c].first_hole : w->cycle[c].next_hole) {
+    offset[n++] = loops->num_vertices;
+    RM_TRY(push_loop(w, &w->cycle[c], loops));
+  }
+  offset[n] = loops->num_vertices;
+  const remap_status status = rm_cut_holes(arena, &w->view, n, offset, loops->vertex, corner, num);
+  return status == REMAP_BAD_MESH ? tangled(w) : status;
+}
+
 /* A polygon with holes, or which meets itself in a vertex, as triangles. */
 static remap_status push_cut(work *w, rm_lid around, rm_lid b, rm_lid state)
 {
-  rm_polygons  loops = {0};
-  int64_t     *offset = rm_arena_alloc(w->scratch, (int64_t)w->num_cycles + 1, sizeof *offset), num = 0;
+  rm_arena    *arena  = rm_arena_new();
+  rm_polygons  loops  = {0};
   rm_lid      *corner = NULL;
-  int          n = 0;
-  remap_status status = offset ? REMAP_OK : REMAP_NO_MEMORY;
+  int64_t      num    = 0;
+  remap_status status = arena ? cut_loops(w, arena, around, &loops, &corner, &num) : REMAP_NO_MEMORY;
 
-  for (rm_lid c = -1; c < w->num_cycles && status == REMAP_OK; c++) {
-    if (c >= 0 && w->cycle[c].inside != around) continue;
-    offset[n++] = loops.num_vertices;
-    status      = push_loop(w, &w->cycle[c < 0 ? around : c], &loops);
-  }
-  if (status == REMAP_OK) {
-    offset[n] = loops.num_vertices;
-    status    = rm_cut_holes(w->scratch, &w->view, n, offset, loops.vertex, &corner, &num);
-    if (status == REMAP_BAD_MESH) status = tangled(w);
-  }
   for (int64_t k = 0; k < num && status == REMAP_OK; k++) {
     for (int h = 0; h < 3 && status == REMAP_OK; h++) status = push_vertex(w->out, corner[3 * k + h]);
     if (status == REMAP_OK) status = push_polygon(w, b, state);
   }
   free(loops.vertex);
+  rm_arena_drop(arena);
   return status;
 }
 
 static remap_status one_triangle(work *w)
 {
-  bool         holes;
   remap_status status = REMAP_OK;
 
   w->num_nodes = w->num_halves = 0;
@@ -656,18 +601,16 @@ static remap_status one_triangle(work *w)
   w->view = rm_view_of(w->l, w->side, w->t);
   RM_TRY(link_halves(w));
   RM_TRY(walk_cycles(w));
-  RM_TRY(find_holes(w, &holes));
+  RM_TRY(find_holes(w));
   for (rm_lid k = 0; k < w->num_cycles && status == REMAP_OK; k++) {
     const cycle *c = &w->cycle[k];
     rm_lid       b = -1, state = c->state;
-    bool         cut = !c->simple;
 
     if (c->inside >= 0) continue;
     if (c->num < 3) return tangled(w);
     if (state == RM_UNKNOWN) RM_TRY(locate(w, c, &b, &state));
     if (b >= 0 && w->side == 1) continue;
-    for (rm_lid h = 0; h < w->num_cycles && holes; h++) cut = cut || w->cycle[h].inside == k;
-    if (cut) {
+    if (!c->simple || c->first_hole >= 0) {
       status = push_cut(w, k, b, state);
       continue;
     }
