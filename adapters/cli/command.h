@@ -23,8 +23,8 @@ typedef struct cli_row {
 
 #define CLI_OTHER SIZE_MAX
 
-/** From a list X(KEY, letter, name, argument, at, text) of all options their keys, in an enum that begins above every letter, so
- *  that getopt's own answers cannot be mistaken, and their rows. */
+/** From a list X(KEY, letter, name, argument, at, text) of all options: their keys, in an enum that begins above every letter,
+ *  so that getopt's own answers cannot be mistaken, and their rows. */
 enum { CLI_FIRST_KEY = 256 };
 #define CLI_KEY(key, letter, name, argument, at, text) KEY_##key,
 #define CLI_ROW(key, letter, name, argument, at, text) {KEY_##key, letter, name, argument, at, text},
