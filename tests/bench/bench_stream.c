@@ -114,20 +114,47 @@ static bool read_task(int argc, char **argv, task *t)
          (t->is_system ? t->many > 5 && t->many % 5 == 0 : t->many > 1);
 }
 
-static void make_fields(const task *t, const int64_t num[2], double *const value[2], remap_field_desc *field)
+/* Somewhere in each cell: the mean of its faces' nodes, [num_cells][3]. */
+static double *middles_of(const remap_mesh *mesh)
+{
+  double *middle = tm_alloc_(3 * mesh->num_cells, sizeof *middle), *count = tm_alloc_(mesh->num_cells, sizeof *count);
+
+  for (int64_t f = 0; f < mesh->num_faces; f++)
+    for (int64_t k = mesh->face_offset[f]; k < mesh->face_offset[f + 1]; k++)
+      for (int side = 0; side < 2; side++) {
+        const int64_t cell = side ? mesh->face_neighbour[f] : mesh->face_owner[f];
+
+        if (cell < 0) continue;
+        for (int d = 0; d < 3; d++) middle[3 * cell + d] += mesh->node_xyz[3 * mesh->face_node[k] + d];
+        count[cell]++;
+      }
+  for (int64_t c = 0; c < mesh->num_cells; c++)
+    for (int d = 0; d < 3; d++) middle[3 * c + d] /= count[c];
+  free(count);
+  return middle;
+}
+
+/* Fields that are smooth but for a jump in a plane. */
+static void make_fields(const task *t, const remap_mesh *giving, int64_t num_receiving, double *const value[2],
+                        remap_field_desc *field)
 {
   static const remap_role role[] = {REMAP_ROLE_DENSITY, REMAP_ROLE_MOMENTUM_X, REMAP_ROLE_MOMENTUM_Y, REMAP_ROLE_MOMENTUM_Z,
                                     REMAP_ROLE_ENERGY};
+  double                 *x      = middles_of(giving);
 
   for (int f = 0; f < t->many; f++) {
+    double *u = value[0] + f * giving->num_cells;
+
     field[f] = (remap_field_desc){.name   = "u",
                                   .nature = REMAP_CONSERVED,
-                                  .in     = value[0] + f * num[0],
-                                  .out    = value[1] + f * num[1],
+                                  .in     = u,
+                                  .out    = value[1] + f * num_receiving,
                                   .system = t->is_system ? 1 + f / 5 : 0,
                                   .role   = t->is_system ? role[f % 5] : REMAP_ROLE_OTHER};
-    for (int64_t c = 0; c < num[0]; c++) value[0][f * num[0] + c] = (f % 5 == 4 ? 10 : 1) * (1 + 1e-3 * (double)(c % 1000));
+    for (int64_t c = 0; c < giving->num_cells; c++)
+      u[c] = (f % 5 == 4 ? 10 : 1) * (2 + .3 * sin(4 * x[3 * c] + f) * cos(3 * x[3 * c + 1]) + (x[3 * c + 2] > .4));
   }
+  free(x);
 }
 
 /* What every field reads, and what all of them read once: pairs, and the stencil too. */
@@ -192,7 +219,7 @@ int main(int argc, char **argv)
   remap_field_desc *field  = tm_alloc_(t.many, sizeof *field);
   double           *time[TIMES], ms[TIMES], once, sum = 0;
   int64_t           bytes[2];
-  make_fields(&t, num, value, field);
+  make_fields(&t, &mine[0]->view, num[1], value, field);
   if (status == REMAP_OK) status = remap_build(ctx);
   if (status == REMAP_OK) status = remap_get_stats(ctx, &stats);
   count_bytes(&t, num, stats.pairs / size, count_neighbours(&mine[0]->view), bytes);

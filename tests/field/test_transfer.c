@@ -278,11 +278,10 @@ static void move_many(boxes_world *w, remap_direction direction, remap_field_des
 
   how.on_uncovered = REMAP_UNCOVERED_KEEP;
   for (int f = 0; f < NUM_FIELDS; f++)
-    field[f] =
-        (remap_field_desc){.nature  = nature[f],
-                           .has_old = f > 1,
-                           .in      = values(w, (int)direction, given[f]),
-                           .out     = values(w, 1 - (int)direction, old)};
+    field[f] = (remap_field_desc){.nature  = nature[f],
+                                  .has_old = f > 1,
+                                  .in      = values(w, (int)direction, given[f]),
+                                  .out     = values(w, 1 - (int)direction, old)};
   RT_EQ(transfer(w, direction, &how, NUM_FIELDS, field, report), REMAP_OK);
 }
 
@@ -333,6 +332,68 @@ static void a_field_does_not_depend_on_the_others_in_its_call(void)
 }
 
 /* A smooth field on finer and finer pairs: order 2 in the mean, with the limiter too. */
+/* Numbers of fields that fill the vectors that fields share in part, and orders with and without limiters. */
+static void a_field_has_the_same_bits_with_any_number_of_others(void)
+{
+  enum { MANY = 11 };
+  static const field_of given[] = {lot, linear, jump, constant};
+  boxes_world           w;
+  remap_field_desc      field[MANY];
+  double               *want[MANY];
+
+  boxes_open(&w, MPI_COMM_WORLD, make(STICKS_OUT, 0), make(STICKS_OUT, 1), TM_RANDOM);
+  for (int order = 1; order <= 2; order++)
+    for (int limiter = REMAP_LIMITER_NONE; limiter <= REMAP_LIMITER_AUTO; limiter++) {
+      const remap_transfer how  = way(order, (remap_limiter)limiter, REMAP_PARTIAL_NORMALISE);
+      const size_t         size = (size_t)w.mesh[1]->num_cells * sizeof(double);
+
+      for (int f = 0; f < MANY; f++) {
+        double *in = values(&w, 0, given[f % 4]);
+
+        for (rm_lid c = 0; c < w.mesh[0]->num_cells; c++) in[c] += 0.1 * f * w.mesh[0]->cell_centroid[c][f % 3];
+        field[f] = (remap_field_desc){.in = in, .out = values(&w, 1, lot)};
+        want[f]  = move_field(&w, REMAP_FORWARD, how, in, NULL);
+      }
+      for (int num = 2; num <= MANY; num++) {
+        RT_EQ(transfer(&w, REMAP_FORWARD, &how, num, field, NULL), REMAP_OK);
+        for (int f = 0; f < num; f++) RT_CHECK(boxes_same_bits(field[f].out, want[f], size));
+      }
+    }
+  boxes_close(&w);
+}
+
+/* One cell that 8000 give to: added up plainly, what they give would lose digits. */
+static void long_rows_keep_all_digits(void)
+{
+  static const field_of fields[] = {constant, lot};
+  boxes_world           w;
+  rm_arena             *arena = rm_arena_new();
+
+  boxes_open(&w, MPI_COMM_WORLD, boxes_grid(20, 20, 20, (boxes_shape){{0, 0, 0}, {1, 1, 1}, .4}),
+             boxes_grid(1, 1, 1, (boxes_shape){{-1, -1, -1}, {2, 2, 2}, 0}), TM_SLABS);
+  for (int f = 0; f < 2; f++) {
+    const rm_rows *rows = &w.mapping->rows[1];
+    const double  *in   = values(&w, 0, fields[f]);
+    const double  *out  = move_field(&w, REMAP_FORWARD, way(1, REMAP_LIMITER_NONE, REMAP_PARTIAL_CONSERVE), in, NULL);
+    double        *got = rm_arena_alloc(arena, rows->num_givers, sizeof *got), magnitude = 0.0, content;
+    double        *buffer = rm_arena_alloc(arena, rows->plan->send_offset[rows->plan->num_send], sizeof *buffer);
+    rm_sum         sum;
+
+    RT_EQ(rm_plan_run(&w.comm, rows->plan, sizeof *got, in, got, buffer), REMAP_OK);
+    if (rows->num_cells == 0) continue;
+    RT_EQ(rows->offset[1], 8000);
+    rm_sum_clear(&sum);
+    for (int64_t k = 0; k < rows->offset[1]; k++) {
+      rm_sum_add_product(&sum, got[rows->giver[k]], rows->volume[k]);
+      magnitude += fabs(got[rows->giver[k]] * rows->volume[k]);
+    }
+    content = rm_sum_value(&sum);
+    RT_NEAR(out[0] * w.mesh[1]->cell_volume[0], content, 4e-16 * fabs(content) + 2e-16 * magnitude);
+  }
+  rm_arena_drop(arena);
+  boxes_close(&w);
+}
+
 static double smooth(const double x[3], rm_gid global) { return (void)global, sin(3.0 * x[0]) * cos(2.0 * x[1]) + x[2] * x[2]; }
 static double mean_error(int n, remap_limiter limiter)
 {
@@ -362,4 +423,5 @@ RT_MAIN(RT_CASE(constant_fields_stay_constant), RT_CASE(linear_fields_are_exact_
         RT_CASE(identical_meshes_copy_bit_by_bit), RT_CASE(values_of_any_size_stay_finite),
         RT_CASE(inverted_cells_receive_like_others), RT_CASE(fields_and_reports_are_those_of_one_rank_bit_by_bit),
         RT_CASE(a_field_does_not_depend_on_the_others_in_its_call),
+        RT_CASE(a_field_has_the_same_bits_with_any_number_of_others), RT_CASE(long_rows_keep_all_digits),
         RT_CASE(errors_of_smooth_fields_fall_with_the_square_of_the_cell_size))

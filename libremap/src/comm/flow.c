@@ -56,15 +56,21 @@ remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size
   return rm_flow_init_chunked(arena, RM_COMM_CHUNK, plan, stream, most, out);
 }
 
-/* Items wanted by neighbour i of a plan, one after the other. */
+/* Items wanted by neighbour i of a plan, one after the other: those that stand one after the other are copied at once. */
 static void gather(const rm_plan *plan, int i, size_t size, const char *item, char *to)
 {
-  const int64_t first = plan->send_offset[i], num = plan->send_offset[i + 1] - first;
+  const rm_lid *wanted = plan->send_item + plan->send_offset[i];
+  const int64_t num    = plan->send_offset[i + 1] - plan->send_offset[i];
 
-  if (size == 8) /* a copy of known size is a single move */
-    for (int64_t k = 0; k < num; k++) memcpy(to + 8 * k, item + 8 * (int64_t)plan->send_item[first + k], 8);
-  else
-    for (int64_t k = 0; k < num; k++) memcpy(to + (size_t)k * size, item + (size_t)plan->send_item[first + k] * size, size);
+  for (int64_t k = 0, end; k < num; k = end) {
+    const char *from = item + (size_t)wanted[k] * size;
+
+    for (end = k + 1; end < num && wanted[end] == wanted[end - 1] + 1; end++) continue;
+    if (end == k + 1 && size == 8)
+      memcpy(to + (size_t)k * size, from, 8); /* a copy of known size is a single move */
+    else
+      memcpy(to + (size_t)k * size, from, (size_t)(end - k) * size);
+  }
 }
 
 static bool is_apart(const rm_parley *parley, int rank)

@@ -27,8 +27,9 @@ void rm_limits_add(const rm_packing *packing, const double *place, rm_limits lim
     const double *bounds = place + packing->at[f] + RM_PACK_BOUNDS;
 
     if (packing->system_of[f] < 0) continue;
-    limits.least[f]    = fmin(limits.least[f], bounds[0] / RM_VALUE_SCALE);
-    limits.greatest[f] = fmax(limits.greatest[f], bounds[1] / RM_VALUE_SCALE);
+    const double least = bounds[0] / RM_VALUE_SCALE, greatest = bounds[1] / RM_VALUE_SCALE;
+    limits.least[f]    = least < limits.least[f] ? least : limits.least[f]; /* not by fmin, which is a call */
+    limits.greatest[f] = greatest > limits.greatest[f] ? greatest : limits.greatest[f];
   }
 }
 
@@ -150,6 +151,7 @@ remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, 
   RM_NEW(w->is_scaled, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(w->factor, arena, rm_mul_sat(setup->giving->num_cells, n));
   RM_NEW(w->room, arena, 4 * (int64_t)load->num_fields);
+  RM_NEW(w->content, arena, RM_FEW_CELLS * (int64_t)load->num_fields);
   return REMAP_OK;
 }
 
@@ -169,36 +171,33 @@ static void add_content(const rm_packing *p, int s, const double *place, double 
 
 static bool has_slopes(const rm_packing *p, int s) { return p->degree[p->system[s].density] > 0; }
 
-/* Does a receiving cell refuse what it is given of a system? */
-static bool refuses(const rm_admission *w, const rm_rows *rows, const rm_packing *p, int s, rm_lid cell, const double *got,
-                    rm_limits limits)
+/* Does a receiving cell refuse, in each of the systems, what it is given? Those that it refused before it is not asked again:
+ * all their givers are scaled. content [num_fields] is what it is given. */
+static void refuse_in_cell(rm_admission *w, const rm_rows *rows, const rm_packing *p, rm_lid cell, const double *got,
+                           const double *content)
 {
-  const int num     = p->num_fields;
-  double   *content = w->room + 2 * num, *change = w->room + 3 * num;
+  const rm_limits limits  = {w->room, w->room + p->num_fields};
+  const double    volume  = rm_row_volume(rows, cell);
+  uint8_t        *refused = w->refused + (int64_t)cell * p->num_systems;
 
-  for (int f = 0; f < num; f++) content[f] = change[f] = 0.0;
+  rm_limits_clear(p, limits);
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++)
-    add_content(p, s, got + (int64_t)rows->giver[k] * p->width, rows->volume[k], rows->moment[k], rows->second[k], content,
-                change);
-  for (int f = 0; f < num; f++) content[f] += change[f];
-  return !admits(p, s, content, rm_row_volume(rows, cell), limits);
+    rm_limits_add(p, got + (int64_t)rows->giver[k] * p->width, limits);
+  for (int s = 0; s < p->num_systems; s++)
+    if (has_slopes(p, s) && !refused[s]) refused[s] = !admits(p, s, content, volume, limits);
 }
 
-/* Which receiving cells refuse; those that did are not asked again: all their givers are scaled. */
+/* Which receiving cells refuse. */
 static void refuse(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, const double *got)
 {
-  const rm_rows  *rows   = setup->rows;
-  const rm_limits limits = {w->room, w->room + p->num_fields};
+  const rm_rows *rows = setup->rows;
 
-  for (rm_lid c = 0; c < rows->num_cells; c++) {
-    uint8_t *refused = w->refused + (int64_t)c * p->num_systems;
-
-    if (!rm_is_mapped(rows->cover[c]) || rm_is_copied(rows, setup->receiving_differs, c, true)) continue;
-    rm_limits_clear(p, limits);
-    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++)
-      rm_limits_add(p, got + (int64_t)rows->giver[k] * p->width, limits);
-    for (int s = 0; s < p->num_systems; s++)
-      if (has_slopes(p, s) && !refused[s]) refused[s] = refuses(w, rows, p, s, c, got, limits);
+  for (rm_lid first = 0, end; first < rows->num_cells; first = end) {
+    end = rows->num_cells - first > RM_FEW_CELLS ? first + RM_FEW_CELLS : rows->num_cells;
+    rm_sum_rows(p, rows, got, first, end, w->content);
+    for (rm_lid c = first; c < end; c++)
+      if (rm_is_mapped(rows->cover[c]) && !rm_is_copied(rows, setup->receiving_differs, c, true))
+        refuse_in_cell(w, rows, p, c, got, w->content + (int64_t)(c - first) * p->num_fields);
   }
 }
 

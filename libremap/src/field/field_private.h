@@ -305,6 +305,15 @@ void rm_system_restore(const rm_packing *packing, double *value);
 void rm_system_combine(const rm_packing *packing, int s, const double *given, const double *number, const double second[6],
                        double volume, const double centroid_error[3], double *place);
 
+/* ---- rows ------------------------------------------------------------------------------------------------------ */
+
+/* Cells whose rows are summed at once, so that what is summed stays at hand. */
+enum { RM_FEW_CELLS = 64 };
+
+/* What receiving cells get, scaled: content [end - first][num_fields] of u V + g.M + h:S over the rows of cells first to
+ * end - 1, but for flags. got as in rm_receipt. Not collective. O(pairs of the rows) per field. */
+void rm_sum_rows(const rm_packing *packing, const rm_rows *rows, const double *got, rm_lid first, rm_lid end, double *content);
+
 /* ---- admit ----------------------------------------------------------------------------------------------------- */
 
 /* Least and greatest amount per mass of each field about some place, [num_fields] each, not scaled. */
@@ -331,6 +340,7 @@ typedef struct rm_admission {
   uint8_t *is_scaled; /* [giving cells][num_systems]                  */
   double  *factor;    /* [giving cells][num_systems] of this round     */
   double  *room;      /* [4][num_fields]                               */
+  double  *content;   /* [RM_FEW_CELLS][num_fields]                    */
 } rm_admission;
 
 /* Flows and room for a load. Not collective. Lives in arena. NO_MEMORY. */
@@ -429,16 +439,7 @@ void rm_turn_vectors(const rm_transfer_setup *setup, const rm_packing *packing, 
 remap_status rm_gather_numbers(const rm_mesh *mesh, const rm_rows *rows, const rm_packing *packing, const double *given,
                                double *number, rm_reason *reason);
 
-/* ---- rows ------------------------------------------------------------------------------------------------------ */
-
-/* What receiving cells get, scaled: content [end - first][num_fields] of u V + g.M + h:S over the rows of cells first to
- * end - 1, but for flags. got as in rm_receipt. Not collective. O(pairs of the rows) per field. */
-void rm_sum_rows(const rm_packing *packing, const rm_rows *rows, const double *got, rm_lid first, rm_lid end, double *content);
-
 /* ---- receive --------------------------------------------------------------------------------------------------- */
-
-/* Cells that receive before others do. */
-enum { RM_FEW_CELLS = 64 };
 
 /* One transfer on the receiving side. */
 struct rm_receipt {

@@ -52,6 +52,37 @@ RM_UNROLLED void fit_few(const rm_stencil *stencil, rm_lid cell, const rm_around
   }
 }
 
+/* The same of one field, x and y side by side. */
+RM_UNROLLED void fit_one(const rm_stencil *stencil, rm_lid cell, const rm_around *u, bool bounded, double *slope,
+                         double *bounds)
+{
+  const int64_t stride = u->stride;
+  const rm_lid  cells = stencil->num_cells, *neighbour = stencil->neighbour;
+  const double *own = u->own, *halo = u->halo, (*weight)[3] = stencil->weight;
+  const double  value = RM_VALUE_SCALE * own[cell * stride];
+  rm_lanes      xy    = rm_lanes_of(0.0);
+  double        z = 0.0, least = value, greatest = value;
+
+  for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
+    const rm_lid n     = neighbour[k];
+    const double other = RM_VALUE_SCALE * (n < cells ? own + n * stride : halo + (n - cells) * stride)[0];
+    const double rise  = other - value;
+
+    xy += rm_lanes_at(weight[k]) * rm_lanes_of(rise);
+    z += weight[k][2] * rise;
+    least    = bounded && other < least ? other : least;
+    greatest = bounded && other > greatest ? other : greatest;
+  }
+  const bool is_good = rm_is_finite(xy[0]) && rm_is_finite(xy[1]) && rm_is_finite(z);
+
+  slope[0]          = is_good ? xy[0] : 0.0;
+  slope[stride]     = is_good ? xy[1] : 0.0;
+  slope[2 * stride] = is_good ? z : 0.0;
+  if (!bounded) return;
+  bounds[0]      = least;
+  bounds[stride] = greatest;
+}
+
 void rm_fit_slopes(const rm_stencil *stencil, const rm_packing *p, rm_lid cell, rm_numbers numbers, rm_fit out)
 {
   const bool bounded = p->has_bounds || p->is_limited;
@@ -66,28 +97,39 @@ void rm_fit_slopes(const rm_stencil *stencil, const rm_packing *p, rm_lid cell, 
       fit_few(stencil, cell, &u, num, TWOS, true, slope, bounds);
     else if (num > 2)
       fit_few(stencil, cell, &u, num, TWOS, false, slope, bounds);
-    else if (bounded)
+    else if (num > 1 && bounded)
       fit_few(stencil, cell, &u, num, 1, true, slope, bounds);
-    else
+    else if (num > 1)
       fit_few(stencil, cell, &u, num, 1, false, slope, bounds);
+    else if (bounded)
+      fit_one(stencil, cell, &u, true, slope, bounds);
+    else
+      fit_one(stencil, cell, &u, false, slope, bounds);
   }
 }
 
 bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7])
 {
-  const double    value   = rm_value_at(u, stencil->num_cells, cell);
-  const rm_around near    = *u; /* this and the sums are copies: no write in the loop can change them */
-  double          fit[9]  = {0.0};
+  const double    value = rm_value_at(u, stencil->num_cells, cell);
+  const rm_around near  = *u; /* this and the sums are copies: no write in the loop can change them */
+  rm_lanes        xy = rm_lanes_of(0.0), z_xx = xy, yy_zz = xy, xy_xz = xy; /* coefficients in twos, and the last one: */
+  double          yz      = 0.0;
   bool            is_good = !stencil->is_reduced[cell];
 
   for (int k = 0; k < 7; k++) curvature[k] = 0.0;
   if (!is_good) return false;
   for (int64_t k = stencil->wide_offset[cell], end = stencil->wide_offset[cell + 1]; k < end; k++) {
-    const double *weight = stencil->wide_weight[k];
-    const double  rise   = rm_value_at(&near, stencil->num_cells, stencil->wide_neighbour[k]) - value;
+    const double  *weight = stencil->wide_weight[k];
+    const double   rise   = rm_value_at(&near, stencil->num_cells, stencil->wide_neighbour[k]) - value;
+    const rm_lanes both   = rm_lanes_of(rise);
 
-    for (int i = 0; i < 9; i++) fit[i] += weight[i] * rise;
+    xy += rm_lanes_at(weight) * both;
+    z_xx += rm_lanes_at(weight + 2) * both;
+    yy_zz += rm_lanes_at(weight + 4) * both;
+    xy_xz += rm_lanes_at(weight + 6) * both;
+    yz += weight[8] * rise;
   }
+  const double fit[9] = {xy[0], xy[1], z_xx[0], z_xx[1], yy_zz[0], yy_zz[1], xy_xz[0], xy_xz[1], yz};
   for (int i = 0; i < 9; i++) is_good = is_good && rm_is_finite(fit[i]);
   if (!is_good) return false;
   for (int i = 0; i < 3; i++) slope[i] = fit[i];
