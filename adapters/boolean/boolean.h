@@ -3,7 +3,8 @@
  *   main.c      the job: open, make the supermesh, write, report
  *   options.c   the command line
  *   operand.c   a CGNS mesh or a closed surface as an operand, with the names of its boundaries and its fields
- *   output.c    the result as CGNS, VTK, STL or OBJ
+ *   output.c    the result as CGNS or VTK
+ *   outer.c     its outer surface as STL or OBJ
  *   report.c    text for people, JSON for programs
  *
  * Standard output gets the report and the progress, standard error one line per failure and nothing else. */
@@ -111,6 +112,9 @@ cli_exit bool_output_check(MPI_Comm comm, const bool_options *options, cli_failu
 /** Write the result by the ending of the output's name; it appears when it is complete. Collective. Errors: USAGE, IO,
  *  INTERNAL. */
 cli_exit bool_output_write(MPI_Comm comm, const bool_options *options, const rslice_content *content, cli_failure *why);
+
+/** Write the outer surface of the result as text, STL (faces cut into triangles) or OBJ. Collective. Errors: IO, INTERNAL. */
+cli_exit bool_outer_write(MPI_Comm comm, const char *path, const rslice_content *content, cli_failure *why);
 
 /* ---- report -------------------------------------------------------------------------------------------------------- */
 

@@ -12,7 +12,6 @@
 static cli_exit from_surface(rsurf_status status, const rsurf_message *message, cli_failure *why)
 {
   static const cli_exit code[] = {[RSURF_OK]       = CLI_DONE,
-                                  [RSURF_USAGE]    = CLI_USAGE,
                                   [RSURF_IO]       = CLI_IO,
                                   [RSURF_GEOMETRY] = CLI_GEOMETRY,
                                   [RSURF_MEMORY]   = CLI_INTERNAL};

@@ -5,7 +5,7 @@
  *   rsurf_repair    faces of one orientation, shells outward, or the reason why that cannot be
  *   rsurf_begin     a surface from polygons: rsurf_add, rsurf_end
  *   rsurf_triangulate   polygons into triangles
- *   rsurf_write     faces into an STL (text) or OBJ file
+ *   rsurf_print_head ...   lines of an STL (text) or OBJ file
  *   rsurf_drop      give everything back
  *
  * Conventions that hold for every function below:
@@ -31,7 +31,6 @@ extern "C" {
 /** Every status: name, number, text. */
 #define RSURF_STATUS_LIST(X)                                               \
   X(OK, 0, "success")                                                      \
-  X(USAGE, 1, "what was asked for does not fit this file")                 \
   X(IO, 2, "a file cannot be read or written, or is not valid STL or OBJ") \
   X(GEOMETRY, 3, "the surface is open, not manifold, or crosses itself")   \
   X(MEMORY, 4, "memory could not be allocated")
@@ -109,9 +108,17 @@ void rsurf_end(rsurf_builder **builder, rsurf_surface *out);
 /** Cut every polygon into triangles on its own corners, none without area where that can be. Errors: MEMORY. */
 rsurf_status rsurf_triangulate(rsurf_surface *surface, rsurf_message *message);
 
-/** Write a surface as text with all digits, STL (triangles only) or OBJ by the ending of `path`, to `out`, which the
- *  caller opens and closes. Errors: USAGE (a polygon cannot be written as STL, or another ending), IO. */
-rsurf_status rsurf_write(FILE *out, const char *path, const rsurf_surface *surface, rsurf_message *message);
+/** Is it the name of an STL file? */
+int rsurf_is_stl(const char *path);
+
+/** A file as text, all digits of every coordinate: groups, solids in STL, of faces; in OBJ all nodes come before them. What
+ *  begins and ends a group; a facet of STL; a node, and a polygon of nodes counted from 0, of OBJ. Nothing is checked:
+ *  ferror(out) tells. */
+void rsurf_print_head(FILE *out, int is_stl, const char *group);
+void rsurf_print_foot(FILE *out, int is_stl, const char *group);
+void rsurf_print_facet(FILE *out, const double *const corner[3]);
+void rsurf_print_node(FILE *out, const double xyz[3]);
+void rsurf_print_polygon(FILE *out, int64_t n, const int64_t *node);
 
 /** Give everything back; harmless on an empty surface. */
 void rsurf_drop(rsurf_surface *surface);

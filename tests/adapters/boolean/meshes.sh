@@ -50,6 +50,8 @@ hold "$wrong" "the supermesh that remap writes keeps them too"
 alike cgns "1 2 3 4" union good.cgns half.cgns
 alike vtu "1 4" union good.cgns dice.obj
 alike obj "1 2" difference good.cgns half.cgns
+alike obj "1 4" union good.cgns dice.obj
+alike stl "1 3" union good.cgns dice.obj
 hold "$wrong" "the bytes do not depend on the number of ranks"
 for n in 1 3; do
   works "$n" rdifference good.cgns half.cgns -o out.cgns --report report.json

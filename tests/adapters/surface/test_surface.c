@@ -463,6 +463,21 @@ static void shells_and_faces_without_size_are_refused(void)
 
 /* ---- writing --------------------------------------------------------------------------------------------------------- */
 
+/* A surface of one group as a file. */
+static void print_surface(FILE *out, int is_stl, const rsurf_surface *s)
+{
+  for (int64_t i = 0; i < s->num_nodes && !is_stl; i++) rsurf_print_node(out, s->node_xyz + 3 * i);
+  rsurf_print_head(out, is_stl, s->group_name[0]);
+  for (int64_t f = 0; f < s->num_faces; f++) {
+    const int64_t *node      = s->face_node + s->face_offset[f];
+    const double  *corner[3] = {s->node_xyz + 3 * node[0], s->node_xyz + 3 * node[1], s->node_xyz + 3 * node[2]};
+
+    if (is_stl) rsurf_print_facet(out, corner);
+    else rsurf_print_polygon(out, s->face_offset[f + 1] - s->face_offset[f], node);
+  }
+  rsurf_print_foot(out, is_stl, s->group_name[0]);
+}
+
 static void what_is_written_is_read_back_bit_by_bit(void)
 {
   static const char *const path[2]    = {"surface_written.stl", "surface_written.obj"};
@@ -475,7 +490,8 @@ static void what_is_written_is_read_back_bit_by_bit(void)
   for (int i = 0; i < 2; i++) {
     FILE *out = fopen(path[i], "w");
 
-    RT_EQ(rsurf_write(out, path[i], &s, &why), RSURF_OK);
+    RT_EQ(rsurf_is_stl(path[i]), i == 0);
+    print_surface(out, i == 0, &s);
     fclose(out);
     RT_EQ(rsurf_read(path[i], 1, &back, &why), RSURF_OK);
     RT_EQ(back.num_faces, 4);
@@ -486,10 +502,7 @@ static void what_is_written_is_read_back_bit_by_bit(void)
     remove(path[i]);
   }
   rsurf_drop(&s);
-  RT_EQ(body(cube, &s, &did), RSURF_OK);
-  RT_EQ(rsurf_write(stdout, "x.stl", &s, &why), RSURF_USAGE);
-  RT_EQ(rsurf_write(stdout, "x.ply", &s, &why), RSURF_USAGE);
-  rsurf_drop(&s);
+  RT_CHECK(!rsurf_is_stl("x.ply") && !rsurf_is_stl("l") && rsurf_is_stl("X.STL"));
 }
 
 RT_MAIN(RT_CASE(binary_stl_is_known_by_its_length_and_read_exactly), RT_CASE(binary_stl_with_a_wrong_count_is_refused),
