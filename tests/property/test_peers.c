@@ -147,6 +147,32 @@ static void a_gap_thinner_than_a_cell_stays_a_gap(void)
   }
 }
 
+/* Numbers of cells across the two zones and the other mesh, one to twelve of them. */
+static void random_numbers(uint64_t *seed, int n[3][3])
+{
+  for (int mesh = 0; mesh < 3; mesh++)
+    for (int d = 0; d < 3; d++) n[mesh][d] = 1 + (int)tm_random(seed, 12);
+}
+
+static void zones_that_touch_in_a_plane_are_whole_whatever_their_faces(void)
+{
+  for (uint64_t seed = 1; seed <= 2 * SEEDS; seed++) {
+    uint64_t s   = seed;
+    double   far = seed % 4 == 0 ? 1e4 : 0, thin = seed % 3 == 0 ? 1e-4 : 1;
+    double   m[12] = {uniform(&s, .1, 1), 0, 0, far, 0, thin * uniform(&s, .1, 1), 0, far, 0, 0, uniform(&s, .1, 1), far};
+    int      n[3][3];
+
+    random_numbers(&s, n);
+    tm_mesh *mesh[2] = {tm_two_zones(n[0], n[1], 0, tm_affine, m), tm_hexahedra(n[2], tm_affine, m)};
+    for (int zones = 0; zones < 2; zones++) {
+      const result r = overlay(mesh[zones], mesh[1 - zones], REMAP_FACES_CENTRE);
+
+      for (int side = 0; side < 2; side++) RT_EQ(r.stats.cells_by_cover[side][REMAP_COVERED], r.stats.cells[side]);
+    }
+    for (int k = 0; k < 2; k++) tm_free(mesh[k]);
+  }
+}
+
 static void cells_a_million_times_smaller_are_not_dropped(void)
 {
   for (uint64_t seed = 1; seed <= SEEDS; seed++) {
@@ -268,6 +294,7 @@ static void neighbours_a_thousand_million_times_larger_do_not_matter(void)
 RT_MAIN(RT_CASE(layers_of_pancakes_on_a_curved_wall_fill_each_other),
         RT_CASE(neighbours_a_thousand_million_times_larger_do_not_matter), RT_CASE(the_unit_of_length_does_not_matter),
         RT_CASE(a_place_far_from_the_origin_does_not_matter), RT_CASE(a_mesh_inside_one_cell_of_the_other_is_wholly_mapped),
-        RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap), RT_CASE(cells_a_million_times_smaller_are_not_dropped),
+        RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap),
+        RT_CASE(zones_that_touch_in_a_plane_are_whole_whatever_their_faces), RT_CASE(cells_a_million_times_smaller_are_not_dropped),
         RT_CASE(rotated_boxes_share_the_volume_known), RT_CASE(warped_faces_lose_nothing_on_either_side),
         RT_CASE(disjoint_and_touching_meshes_share_nothing), RT_CASE(an_overlap_a_millionth_of_a_millionth_thick_survives))
