@@ -527,7 +527,7 @@ static remap_status collect_polygons(work *w, rm_lid i)
   w->skin_only = true;
   for (int k = 0; k < w->num_slots; k++) {
     slot *s = &w->slots[k];
-    if (s->first_polygon == NO_POLYGONS || fabs(s->sum[0]) > rm_moments_noise(w, i, s)) continue;
+    if (s->first_polygon == NO_POLYGONS || s->kinds & APART || fabs(s->sum[0]) > rm_moments_noise(w, i, s)) continue;
     s->kinds |= IN_DOUBT;
     w->skin_only = false;
   }
@@ -557,20 +557,32 @@ static remap_status drop_pair(work *w, rm_lid i, slot *s)
   return push_pair(w, i, s, flags | RM_PAIR_EMPTY);
 }
 
+/* The boxes of the two cells meet in a face at most: a cell winds about nothing beyond its box, so the pair has no volume. */
+static bool are_apart(const work *w, rm_lid i, rm_lid j)
+{
+  const double *a = w->o->mesh[0]->cell_box[i], *b = w->o->mesh[1]->cell_box[j];
+
+  return a[0] >= b[3] || a[1] >= b[4] || a[2] >= b[5] || b[0] >= a[3] || b[1] >= a[4] || b[2] >= a[5];
+}
+
+/* What must be known of a pair besides its sums. Only where skins pass do cells that are apart need their polygons. */
+static void look_closer(work *w, rm_lid i, slot *s, bool *sums, bool *polygons)
+{
+  const double vi = fabs(w->part->piece[0].cell_volume[i]), vj = fabs(w->part->piece[1].cell_volume[s->target]);
+  const double noise = rm_moments_noise(w, i, s);
+  const bool   skin  = (s->kinds & (SKIN_SOURCE | SKIN_TARGET)) != 0;
+
+  if (are_apart(w, i, s->target)) s->kinds |= APART;
+  else if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, *sums = true;
+  if (skin || (!(s->kinds & APART) && fabs(s->sum[0]) <= noise)) s->first_polygon = WANTS_POLYGONS, *polygons = true;
+}
+
 static remap_status finish_cell(work *w, rm_lid i)
 {
-  const double vi = fabs(w->part->piece[0].cell_volume[i]);
-  bool         sums = false, polygons = false;
+  bool sums = false, polygons = false;
 
-  for (int k = 0; k < w->num_slots; k++) {
-    slot        *s  = &w->slots[k];
-
-    if (!rm_part_makes_pair(w->part, i, s->target)) continue;
-    const double vj = fabs(w->part->piece[1].cell_volume[s->target]), noise = rm_moments_noise(w, i, s);
-
-    if (noise > 6 * 0x1p-33 * (vi < vj ? vi : vj)) s->kinds |= AGAIN, sums = true;
-    if (fabs(s->sum[0]) <= noise || s->kinds & (SKIN_SOURCE | SKIN_TARGET)) s->first_polygon = WANTS_POLYGONS, polygons = true;
-  }
+  for (int k = 0; k < w->num_slots; k++)
+    if (rm_part_makes_pair(w->part, i, w->slots[k].target)) look_closer(w, i, &w->slots[k], &sums, &polygons);
   if (sums) RM_TRY(sum_again(w, i));
   if (polygons) RM_TRY(collect_polygons(w, i));
   for (int k = 0; k < w->num_slots; k++) {
@@ -578,7 +590,7 @@ static remap_status finish_cell(work *w, rm_lid i)
 
     w->slot_of[s->target] = -1;
     if (!rm_part_makes_pair(w->part, i, s->target)) continue;
-    if (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, s))
+    if (s->kinds & APART || (s->kinds & IN_DOUBT && !rm_moments_has_volume(w, s)))
       RM_TRY(drop_pair(w, i, s));
     else
       RM_TRY(push_pair(w, i, s, skins_in(w, i, s, false)));

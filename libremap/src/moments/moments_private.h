@@ -19,7 +19,8 @@ enum {
   SKIN_SOURCE = 8, /* one of its polygons lies in the skin of mesh 1 */
   SKIN_TARGET = 16,
   AGAIN       = 32, /* to be summed again in double-double   */
-  IN_DOUBT    = 64  /* its sum is within its noise           */
+  IN_DOUBT    = 64, /* its sum is within its noise           */
+  APART       = 128 /* its cells' boxes share no volume      */
 };
 
 enum { NO_POLYGONS = -1, WANTS_POLYGONS = -2 };
