@@ -80,6 +80,9 @@ cli_exit cli_masks_read(cli_job *j, cli_failure *why);
  *  0), INTERNAL. */
 cli_exit cli_volumes_read(cli_job *j, cli_failure *why);
 
+/** After remap_build, remark on volumes that cannot be any. Not collective; alike on all ranks. */
+void cli_volumes_doubt(cli_job *j);
+
 /** Refuse a --priority that names zones of neither file. Not collective; alike on all ranks. Errors: USAGE. */
 cli_exit cli_priority_check(const cli_job *j, cli_failure *why);
 

@@ -145,6 +145,7 @@ static cli_exit build(cli_job *j, cli_failure *why)
   for (int side = 0; side < 2; side++) cli_set_mesh(j, j->ctx, (remap_side)side);
   CLI_TRY(cli_from_remap(j, remap_build(j->ctx), why));
   CLI_TRY(cli_from_remap(j, remap_get_stats(j->ctx, &j->report.stats), why));
+  cli_volumes_doubt(j);
   CLI_TRY(cli_masks_apply(j, why));
   CLI_TRY(cli_coverage_find(j, why));
   return cli_masks_settle(j, why);

@@ -84,6 +84,11 @@ works 1 masked.cgns mesh.cgns -o out.cgns --report report.json $density --source
 near "$(value source solver_volume)" 0.12548828125 1e-14
 hold "$wrong" "they are scaled with SOURCE"
 
+works 1 good.cgns good.cgns -o out.cgns --report report.json --target-volume FlowSolution/Density
+grep -q "good.cgns: field FlowSolution/Density differs from the volume of a cell by 69.4 times" report.json ||
+  complain "$(grep -A3 notes report.json)"
+hold "$wrong" "a field that cannot be volumes is doubted"
+
 # Zones that overlap by half, the doubled cells of the second one being holes.
 works 2 overset.cgns wide.cgns -o out.cgns --report report.json $density --source-mask Iblank --on-uncovered fill=1 \
   --on-partial normalise
