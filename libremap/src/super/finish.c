@@ -91,6 +91,31 @@ static remap_status number_vertices(work *w, rm_arena *passing, int64_t *number)
   return rm_super_number(passing, w->job->comm, s->num_vertices, RM_SOUP_CORNERS, &key[0][0], number, &w->v.global_nodes);
 }
 
+/* Turn every loop of nodes until it begins with its least one. */
+static remap_status turn_loops(rm_soup *s, rm_arena *passing)
+{
+  int64_t longest = 0;
+  rm_lid *copy;
+
+  for (int64_t f = 0; f < s->num_faces; f++) {
+    const int64_t n = s->face[f + 1].first - s->face[f].first;
+    longest         = n > longest ? n : longest;
+  }
+  RM_NEW(copy, passing, longest);
+  for (int64_t f = 0; f < s->num_faces; f++) {
+    const int64_t n = s->face[f + 1].first - s->face[f].first;
+    rm_lid       *loop  = s->loop + s->face[f].first;
+    int64_t       least = 0;
+
+    for (int64_t k = 1; k < n; k++)
+      if (loop[k] < loop[least]) least = k;
+    if (!least) continue;
+    for (int64_t k = 0; k < n; k++) copy[k] = loop[k < n - least ? k + least : k + least - n];
+    memcpy(loop, copy, sizeof *loop * (size_t)n);
+  }
+  return REMAP_OK;
+}
+
 /* Nodes of the result: distinct vertices in order. The soup's loops become loops of nodes; it has no vertices any more. */
 static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number)
 {
@@ -125,31 +150,30 @@ static remap_status make_nodes(work *w, rm_arena *passing, const int64_t *number
   w->v.num_nodes   = n;
   w->v.node_global = global;
   w->v.node_xyz    = &xyz[0][0];
-  return REMAP_OK;
+  return turn_loops(w->soup, passing);
 }
 
+/* What their numbers are made from is given back before the nodes are made. */
 static remap_status do_vertices(work *w, rm_arena *passing)
 {
-  int64_t *number = rm_arena_alloc(passing, w->soup->num_vertices, sizeof *number);
+  int64_t     *number = rm_arena_alloc(passing, w->soup->num_vertices, sizeof *number);
+  rm_arena    *keys   = rm_arena_new();
+  remap_status status = rm_comm_agree(w->job->comm, number && keys ? REMAP_OK : REMAP_NO_MEMORY, NULL);
 
-  RM_TRY(rm_comm_agree(w->job->comm, number ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_TRY(number_vertices(w, passing, number));
+  if (status == REMAP_OK) status = number_vertices(w, keys, number);
+  rm_arena_drop(keys);
+  RM_TRY(status);
   return rm_comm_agree_reason(w->job->comm, make_nodes(w, passing, number), w->reason);
 }
 
 /* ---- faces ------------------------------------------------------------------------------------------------------- */
 
-/* The canonical walk of face f: its first place, and +1 if it runs as the loop does, -1 if against it. */
-static int walk_of(const rm_soup *s, int64_t f, int64_t *at)
+/* The way in which face f runs from its least node, which is its first, to the lesser of its neighbours: +1 with the loop, -1. */
+static int walk_of(const rm_soup *s, int64_t f)
 {
-  const int64_t first = s->face[f].first, n = s->face[f + 1].first - first;
-  const rm_lid *loop  = s->loop + first;
-  int64_t       least = 0;
+  const rm_lid *loop = s->loop + s->face[f].first, *last = s->loop + s->face[f + 1].first - 1;
 
-  for (int64_t k = 1; k < n; k++)
-    if (loop[k] < loop[least]) least = k;
-  *at = least;
-  return loop[least + 1 < n ? least + 1 : 0] < loop[least ? least - 1 : n - 1] ? 1 : -1;
+  return loop[1] < *last ? 1 : -1;
 }
 
 static remap_status number_faces(work *w, rm_arena *passing)
@@ -160,9 +184,9 @@ static remap_status number_faces(work *w, rm_arena *passing)
   RM_TRY(rm_comm_agree(w->job->comm, key ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   for (int64_t f = 0; f < s->num_faces && key; f++) {
     const int64_t first = s->face[f].first, n = s->face[f + 1].first - first;
-    int64_t       at;
-    const int     step = walk_of(s, f, &at);
+    const int     step = walk_of(s, f);
     uint64_t      hash = 0;
+    int64_t       at   = 0;
 
     for (int64_t k = 0; k < n; k++) {
       const uint64_t g = (uint64_t)w->v.node_global[s->loop[first + at]];
@@ -182,7 +206,7 @@ static remap_status join_faces(work *w, rm_arena *passing)
 {
   const rm_soup *s = w->soup;
   rm_keyed      *key, *spare;
-  int64_t        n = 0, a, b;
+  int64_t        n = 0;
 
   RM_NEW(key, passing, s->num_faces);
   RM_NEW(spare, passing, s->num_faces);
@@ -198,12 +222,17 @@ static remap_status join_faces(work *w, rm_arena *passing)
     }
     const rm_soup_face *x = &s->face[w->face_at[n - 1]], *y = &s->face[key[f].item];
     if (w->face_twin[n - 1] >= 0 || x->cell[1] >= 0 || y->cell[1] >= 0 ||
-        walk_of(s, x - s->face, &a) == walk_of(s, y - s->face, &b))
+        walk_of(s, x - s->face) == walk_of(s, y - s->face))
       return tangled(w, name_at_face(w, y - s->face));
     w->face_twin[n - 1] = (rm_lid)key[f].item;
   }
   w->v.num_faces = n;
   return REMAP_OK;
+}
+
+static remap_status do_join(work *w, rm_arena *passing)
+{
+  return rm_comm_agree_reason(w->job->comm, join_faces(w, passing), w->reason);
 }
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
@@ -216,8 +245,7 @@ static remap_status number_cells(work *w, rm_arena *passing)
   RM_TRY(rm_comm_agree(w->job->comm, key ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   for (int64_t c = 0; c < s->num_cells && key; c++) key[c] = UINT64_MAX;
   for (int64_t f = 0; f < s->num_faces && key; f++) {
-    int64_t   at;
-    const int step = walk_of(s, f, &at);
+    const int step = walk_of(s, f);
     for (int h = 0; h < 2; h++) {
       const rm_lid   c = s->face[f].cell[h];
       const uint64_t mine = 2 * (uint64_t)w->face_number[f] + ((step > 0) == (h == 0));
@@ -283,7 +311,6 @@ static void write_face(const work *w, int64_t f, face_arrays *to)
   const int64_t       n = x[1].first - x[0].first;
   const rm_lid        a = w->new_cell[x->cell[0]], other = y ? y->cell[0] : x->cell[1], b = other < 0 ? -1 : w->new_cell[other];
   const bool          turned = b >= 0 && b < a;
-  int64_t             at;
 
   to->global[f]    = w->face_number[w->face_at[f]];
   to->owner[f]     = turned ? b : a;
@@ -297,12 +324,7 @@ static void write_face(const work *w, int64_t f, face_arrays *to)
     to->from[side][f] = z->from[side];
     to->rank[side][f] = z->from_rank[side];
   }
-  walk_of(s, x - s->face, &at);
-  for (int64_t k = 0; k < n; k++) {
-    to->node[to->offset[f] + k] = s->loop[x->first + at];
-    at += turned ? -1 : 1;
-    at = at < 0 ? n - 1 : at == n ? 0 : at;
-  }
+  for (int64_t k = 0; k < n; k++) to->node[to->offset[f] + k] = s->loop[x->first + (turned && k ? n - k : k)];
   to->offset[f + 1] = to->offset[f] + n;
 }
 
@@ -360,9 +382,8 @@ static remap_status collect_halves(const work *w, rm_arena *passing, int64_t **o
   for (int64_t f = 0; f < w->v.num_faces; f++) {
     if (w->v.face_neighbour[f] >= 0) continue;
     const int64_t at = next[keeper_of(w->v.face_global[f], size) + 1]++, made = w->face_at[f];
-    int64_t       first;
     (*list)[at] = (half){w->v.face_global[f], w->v.cell_global[w->v.face_owner[f]], name_at_face(w, made),
-                         walk_of(w->soup, made, &first)};
+                         walk_of(w->soup, made)};
     (*face)[at]      = (rm_lid)f;
   }
   *offset = next; /* each rank's end is the next one's begin */
@@ -464,7 +485,7 @@ remap_status rm_super_finish(rm_arena *arena, const rm_super_job *job, rm_soup *
   RM_GOTO(done, status = rm_comm_agree(job->comm, passing ? make_room(&w, passing) : REMAP_NO_MEMORY, NULL));
   RM_GOTO(done, status = in_passing(&w, do_vertices));
   RM_GOTO(done, status = in_passing(&w, number_faces));
-  RM_GOTO(done, status = rm_comm_agree_reason(job->comm, join_faces(&w, passing), reason));
+  RM_GOTO(done, status = in_passing(&w, do_join));
   RM_GOTO(done, status = in_passing(&w, number_cells));
   RM_GOTO(done, status = rm_comm_agree(job->comm, make_cells(&w, passing, out), NULL));
   RM_GOTO(done, status = rm_comm_agree(job->comm, make_faces(&w), NULL));
