@@ -290,7 +290,7 @@ static remap_status join(rm_arena *arena, rm_arena *passing, const work *w, cons
 
   for (int h = 0; h < 2; h++) side[h].side = (remap_side)h;
   status = rm_super_make(passing, &job, &s, &reason);
-  if (status != REMAP_OK) RM_TRY(rm_comm_agree_reason(w->job->comm, status, &reason) == status ? REMAP_OK : REMAP_MPI_FAILURE);
+  if (status != REMAP_OK) status = rm_comm_agree_reason(w->job->comm, status, &reason);
   if (status == REMAP_BAD_MESH) explain(w, part, &reason);
   RM_TRY(status);
   const remap_supermesh_view *v = &s->view;

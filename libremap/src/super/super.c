@@ -167,6 +167,22 @@ done:
   return status;
 }
 
+/* A failure in terms of the meshes that were given; parts of cells that two zones hold may be too thin once nodes are rounded.
+ * Collective. */
+static remap_status explain(const rm_comm *comm, const rm_conformed whole[2], remap_status status, rm_reason *reason)
+{
+  status = rm_comm_agree_reason(comm, status, reason); /* for all ranks to see the same side */
+  if (reason->side >= 0 && whole[reason->side].mesh) rm_super_trace_reason(comm, &whole[reason->side], reason);
+  for (int side = 0; side < 2 && status == REMAP_BAD_MESH; side++) {
+    if (!(whole[side].overlap > 0)) continue;
+    *reason = (rm_reason){side, reason->side == side ? reason->global_cell : -1,
+                          "its zones overlap by rounding, and parts of cells that two of them hold are too thin to be told from "
+                          "it: let nodes agree where zones touch, or choose one of the zones"};
+    break;
+  }
+  return status;
+}
+
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
 {
   rm_arena      *own[2]   = {rm_arena_new(), rm_arena_new()};
@@ -183,8 +199,7 @@ remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_s
   }
   if (status == REMAP_OK) {
     status = rm_super_make(arena, &whole_job, &super, reason);
-    if (status != REMAP_OK && reason->side >= 0 && whole[reason->side].mesh)
-      rm_super_trace_reason(job->comm, &whole[reason->side], reason);
+    if (status != REMAP_OK) status = explain(job->comm, whole, status, reason);
   }
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     const double unit = 1 / job->frame->scale;
