@@ -29,7 +29,7 @@ static void no_rank_has_more_than_115_percent_of_the_mean_work_on_even_and_grade
 
 static void slender_cells_are_shared_out_nearly_as_well(void)
 {
-  static const char *const cases[] = {"stretched", "corner", "layers"};
+  static const char *const cases[] = {"stretched", "corner", "layers"}; /* counts, which cost unlike there */
 
   for (int k = 0; k < 3; k++) {
     const double ratio = ratio_of(cases[k], N);
@@ -52,7 +52,8 @@ static double most_bytes(MPI_Comm comm, const char *name, int n)
   return bytes;
 }
 
-/* Cells along the cuts are on two ranks: a surface, besides each rank's share. */
+/* Cells along the cuts are on two ranks: a surface, besides each rank's share, that of n / P cells being P^(1/3) of them as
+ * large as that of n. */
 static void memory_of_a_rank_falls_with_their_number(void)
 {
   for (int k = 0; k < NUM_EVEN; k++) {
@@ -61,7 +62,7 @@ static void memory_of_a_rank_falls_with_their_number(void)
 
     MPI_Bcast(&alone, 1, MPI_DOUBLE, 0, MPI_COMM_WORLD);
     const double share = here * rt_size() / alone;
-    if (!RT_CHECK(share <= 1 + 0.1 * rt_size())) printf("# %s: %.2f of a share\n", even_cases[k], share);
+    if (!RT_CHECK(share <= 1 + 0.82 * (cbrt(rt_size()) - 1))) printf("# %s: %.2f of a share\n", even_cases[k], share);
   }
 }
 

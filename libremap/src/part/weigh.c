@@ -6,12 +6,14 @@
  *     1  +  its edges cross their faces  +  their edges cross its faces  +  their corners lie in it, an eighth each,
  *
  * the 1 for its own corners in them. So crossings are counted by boxes that meet less corners within; and the last term shares
- * out what the sources cost. Cells that fill little of their boxes, turned hexahedra or tetrahedra, meet more boxes, by as much
- * as these overlap: their crossings count by the geometric mean of what the two cells fill.
+ * out what the sources cost. What it leaves of a source that meets targets here, because it meets others elsewhere or sticks
+ * out of all, costs here too: a source comes whole to every rank that needs it. Cells that fill little of their boxes, turned
+ * hexahedra or tetrahedra, meet more boxes, by as much as these overlap: their crossings count by the geometric mean of what
+ * the two cells fill.
  *
  * Giants are left out of this; what they cost is counted where the boxes of their faces meet cells. A source cell that is
- * paired with a giant bears the cost at its own seat. O(n log n) time, and a visit for each pair of boxes, 90 bytes per
- * source. */
+ * paired with a giant bears the cost at its own seat. O(n log n) time, and a visit for each pair of boxes, 102 bytes
+ * per source. */
 #include "part/part_private.h"
 
 #include <math.h>
@@ -30,9 +32,12 @@ enum { MOST_VISITS = 32 };
 
 /* The small sources whose boxes may meet a target here. */
 typedef struct sources {
+  rm_lid            num;
   double          (*box)[6];
   rm_visitor       *as; /* what they are */
   const rm_boxtree *tree;
+  double           *left;   /* what no target here has paid for yet, of 1 */
+  rm_lid           *target; /* one that meets it, -1: none does           */
 } sources;
 
 static remap_status gather_sources(rm_arena *scratch, const rm_tags *tags, const rm_visitors *visitors, sources *out)
@@ -54,6 +59,13 @@ static remap_status gather_sources(rm_arena *scratch, const rm_tags *tags, const
     memcpy(out->box[num], visitors->box[k], sizeof *out->box);
     out->as[num++] = visitors->visitor[k];
   }
+  RM_NEW(out->left, scratch, num);
+  RM_NEW(out->target, scratch, num);
+  for (rm_lid k = 0; k < num; k++) {
+    out->left[k]   = 1;
+    out->target[k] = -1;
+  }
+  out->num = num;
   return rm_boxtree_build(scratch, num, (const double(*)[6])out->box, &out->tree);
 }
 
@@ -61,7 +73,8 @@ static remap_status gather_sources(rm_arena *scratch, const rm_tags *tags, const
 typedef struct estimate {
   const sources *s;
   const double  *box;
-  double         extent, volume; /* largest extent of the box; volume of the cell */
+  rm_lid         target;
+  double         extent, volume, fill; /* largest extent of the box; volume of the cell; over that of the box */
   double         crossings, triangles; /* the latter of the sources it has to itself */
   int64_t        visits;
 } estimate;
@@ -106,6 +119,8 @@ static int meet_source(void *user, rm_lid item)
   e->crossings += (1 - own - corners_in(e->s->box[item], e->box)) * sqrt((double)as->fill) *
                   (is_slender(e, e->s->box[item], (double)as->fill) ? SLENDER : 1);
   e->triangles += own * as->num_triangles;
+  e->s->left[item] -= own * e->fill;
+  e->s->target[item] = e->target;
   e->visits++;
   return 0;
 }
@@ -124,7 +139,12 @@ static void weigh_targets(const rm_tags *tags, const sources *s, int64_t *work)
   for (rm_lid k = 0; k < tags->num[REMAP_TARGET]; k++) {
     const rm_tag *tag = &tags->tag[REMAP_TARGET][k];
     const double *box = tags->box[REMAP_TARGET][k];
-    estimate      e   = {.s = s, .box = box, .extent = extent_of(box), .volume = volume_of(box) * (double)tag->fill};
+    estimate      e   = {.s      = s,
+                         .box    = box,
+                         .target = k,
+                         .extent = extent_of(box),
+                         .volume = volume_of(box) * (double)tag->fill,
+                         .fill   = (double)tag->fill};
 
     if (tag->is_giant) continue;
     if (skip == 0 || volume_of(box) > 2 * size) {
@@ -137,6 +157,8 @@ static void weigh_targets(const rm_tags *tags, const sources *s, int64_t *work)
     }
     work[k] = last + TRIANGLE * (int64_t)tag->num_triangles;
   }
+  for (rm_lid i = 0; i < s->num; i++)
+    if (s->target[i] >= 0 && s->left[i] > 0) work[s->target[i]] += rounded(TRIANGLE * s->left[i] * s->as[i].num_triangles);
 }
 
 /* ---- faces of giants ---------------------------------------------------------------------------------------------- */
