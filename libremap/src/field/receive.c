@@ -357,7 +357,7 @@ void rm_find_plain(const rm_transfer_setup *setup, uint8_t *is_plain)
 
   for (rm_lid c = 0; c < rows->num_cells; c++) {
     is_plain[c] = 0;
-    if (rows->cover[c] != REMAP_COVERED || rows->same[rows->offset[c]]) continue;
+    if (rows->cover[c] != REMAP_COVERED || rows->same[c]) continue;
     const row_sums row = measure_row(rows, c);
     is_plain[c]        = !is_void(setup->receiving->cell_volume[c], &row);
   }

@@ -83,15 +83,15 @@ remap_status rm_mapping_mask(rm_arena *arena, const rm_comm *comm, const rm_mapp
 /* Every invariant that one rank can see; slow. Not collective. */
 remap_status rm_mapping_check(const rm_mapping *mapping, const rm_mesh *const mesh[2]);
 
-/* A sum with compensation (Neumaier): sum + lost. */
+/* A sum with compensation (after Neumaier): sum + lost. */
 typedef struct rm_compensated {
   double sum, lost;
 } rm_compensated;
 static inline void rm_compensated_add(rm_compensated *s, double x)
 {
-  const double next = s->sum + x;
+  const double next = s->sum + x, added = next - s->sum;
 
-  s->lost += fabs(s->sum) >= fabs(x) ? (s->sum - next) + x : (x - next) + s->sum;
+  s->lost += (s->sum - (next - added)) + (x - added); /* what rounding took, exactly and without a branch (Knuth's two-sum) */
   s->sum = next;
 }
 static inline double rm_compensated_value(const rm_compensated *s) { return s->sum + s->lost; }
