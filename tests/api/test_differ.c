@@ -208,6 +208,31 @@ static void calls_before_a_build_are_refused_and_so_are_first_ones_that_differ(v
   close_world(&w);
 }
 
+/* The overlay of what was lent before is not used for what has more cells, or fewer. */
+static void meshes_of_another_size_are_refused_until_they_are_built(void)
+{
+  static const double away[12] = {1, 0, 0, .01, 0, 1, 0, 0, 0, 0, 1, 0};
+  const remap_motion  motion[2] = {{NULL, away}, {NULL, NULL}};
+  remap_pairs_view    pairs;
+  world               w[2];
+
+  for (int k = 0; k < 2; k++) open_world(&w[k], 4 - k);
+  RT_EQ(remap_build(w[0].ctx), REMAP_OK);
+  for (int larger = 0; larger < 2; larger++) {
+    world *now = &w[1 - larger];
+
+    RT_EQ(remap_set_mesh(w[0].ctx, REMAP_TARGET, &now->mine[1]->view), REMAP_OK);
+    RT_EQ(transfer(&w[0], 0, 1, REMAP_LIMITER_NONE, 1, WITHOUT), REMAP_BAD_ORDER);
+    RT_EQ(remap_move(w[0].ctx, motion), REMAP_BAD_ORDER);
+    RT_CHECK(remap_message(w[0].ctx)[0] != '\0');
+    RT_EQ(remap_pairs(w[0].ctx, REMAP_FORWARD, &pairs), REMAP_BAD_ORDER);
+    RT_EQ(remap_build(w[0].ctx), REMAP_OK);
+    RT_EQ(remap_pairs(w[0].ctx, REMAP_FORWARD, &pairs), REMAP_OK);
+    RT_EQ(pairs.num_rows, now->mine[1]->view.num_cells);
+  }
+  for (int k = 0; k < 2; k++) close_world(&w[k]);
+}
+
 /* What only looks, or lends, says why it fails, and not what failed before. */
 static void messages_are_those_of_the_last_failure_of_any_call(void)
 {
@@ -247,4 +272,5 @@ static void messages_are_those_of_the_last_failure_of_any_call(void)
 RT_MAIN(RT_CASE(a_call_that_one_rank_makes_differently_is_refused_and_the_next_one_works),
         RT_CASE(long_messages_that_nobody_expects_are_taken_away),
         RT_CASE(calls_before_a_build_are_refused_and_so_are_first_ones_that_differ),
+        RT_CASE(meshes_of_another_size_are_refused_until_they_are_built),
         RT_CASE(messages_are_those_of_the_last_failure_of_any_call))

@@ -56,6 +56,11 @@ int MPI_Allgatherv(const void *in, int n, MPI_Datatype type, void *out, const in
   calls.collective++;
   return PMPI_Allgatherv(in, n, type, out, m, at, to, comm);
 }
+int MPI_Ibarrier(MPI_Comm comm, MPI_Request *request)
+{
+  calls.collective++;
+  return PMPI_Ibarrier(comm, request);
+}
 int MPI_Send(const void *data, int n, MPI_Datatype type, int rank, int tag, MPI_Comm comm)
 {
   calls.collective++; /* the library asks everybody along a tree */
@@ -210,28 +215,33 @@ static void transfers_after_the_first_take_no_memory(void)
   close_world(&w);
 }
 
-/* After the first transfer a rank sends each of its peers a message per round, or two if items are many, and there is no
- * collective call. */
+/* After the first transfer a rank sends each of its peers a message per round, or two if items are many, for however many
+ * fields, and there is no collective call. */
 static void transfers_after_the_first_are_exchanges_with_neighbours(void)
 {
+  enum { MANY = 9 };
   static const int rounds[3] = {1, 2, 6}; /* given; halo; slopes, roughness thrice */
   world            w;
 
   if (open_world(&w, MPI_COMM_WORLD, rt_size(), TM_SLABS, 7)) {
-    double                *v   = moved(&w, 0);
-    remap_transfer         how = nearest();
-    const remap_field_desc f   = {.nature = REMAP_CONSERVED, .in = w.u[0], .out = v};
+    double          *v   = tm_alloc_(MANY * w.cells[1], sizeof *v);
+    remap_transfer   how = nearest();
+    remap_field_desc f[MANY];
 
     how.on_uncovered = REMAP_UNCOVERED_FILL;
+    for (int k = 0; k < MANY; k++)
+      f[k] = (remap_field_desc){.nature = REMAP_CONSERVED, .in = w.u[0], .out = v + k, .out_stride = MANY};
     for (int kind = 0; kind < 3; kind++) {
       how.order   = kind ? 2 : 1;
       how.limiter = kind == 2 ? REMAP_LIMITER_AUTO : REMAP_LIMITER_BARTH_JESPERSEN;
-      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
-      memset(&calls, 0, sizeof calls);
-      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1, &f, NULL), REMAP_OK);
-      const struct calls now = calls; /* before the harness calls MPI again */
-      RT_EQ(now.collective, 0);
-      for (int r = 0; r < rt_size(); r++) RT_CHECK(now.to[r] <= (r == rt_rank() ? 0 : 2 * rounds[kind]));
+      RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, MANY, f, NULL), REMAP_OK);
+      for (int num = 1; num <= MANY; num += MANY - 1) {
+        memset(&calls, 0, sizeof calls);
+        RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, num, f, NULL), REMAP_OK);
+        const struct calls now = calls; /* before the harness calls MPI again */
+        RT_EQ(now.collective, 0);
+        for (int r = 0; r < rt_size(); r++) RT_CHECK(now.to[r] <= (r == rt_rank() ? 0 : 2 * rounds[kind]));
+      }
     }
     free(v);
   }
