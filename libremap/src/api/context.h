@@ -28,10 +28,10 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
-/* What one rank alone overlays at once at most: about 4000 hexahedra of either mesh, for which the overlay takes 15 MB with
- * diagonal faces, 25 MB with centres; and how many triangles may come twice for that. Several ranks would wait for each other in
- * every round, by a tenth and more of the whole: they have one. */
-enum { RM_ROUND_TRIANGLES = 100000 };
+/* What one rank alone overlays at once at most: about 3300 hexahedra of either mesh, for which the overlay takes 12 MB with
+ * diagonal faces, 21 MB with centres; and how many triangles may come twice for that. Several ranks would wait for each other
+ * in every round, by a tenth and more of the whole: they have one. */
+enum { RM_ROUND_TRIANGLES = 80000 };
 #define RM_ROUND_REPEATS 0.5
 
 /* Calls that all ranks make together, or among neighbours. */

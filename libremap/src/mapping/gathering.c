@@ -12,6 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { SLACK = 32 }; /* growing arrays have so much of their length to spare */
+
 enum {
   IS_CUT   = 1, /* the skin of the giving mesh passes through the receiver */
   IS_EMPTY = 2  /* the giver has no volume; no pair, but its skin counts   */
@@ -137,12 +139,12 @@ static remap_status deliver(rm_arena *scratch, const rm_comm *comm, const mail *
 
 /* ---- in ---------------------------------------------------------------------------------------------------------- */
 
-/* Room for need elements, and an eighth more: what is left over counts where pairs fill most of the memory. */
+/* Room for need elements, and a little more: what is left over counts where pairs fill most of the memory. */
 static remap_status reserve(void *data, int64_t room, int64_t need, size_t size)
 {
   int64_t wish = 0;
 
-  return need > room ? rm_grow(data, &wish, rm_add_sat(need, need / 8), size) : REMAP_OK;
+  return need > room ? rm_grow(data, &wish, rm_add_sat(need, need / SLACK), size) : REMAP_OK;
 }
 
 static remap_status reserve_pairs(rm_arrivals *a, const mail *in, int num_ranks, bool is_source)
@@ -155,8 +157,8 @@ static remap_status reserve_pairs(rm_arrivals *a, const mail *in, int num_ranks,
   if (in->second) RM_TRY(reserve(&a->second, a->room, need, sizeof *a->second));
   RM_TRY(reserve(&a->volume, a->held_room, room, sizeof *a->volume));
   RM_TRY(reserve(&a->moment, a->held_room, room, sizeof *a->moment));
-  if (need > a->room) a->room = need + need / 8;
-  if (room > a->held_room) a->held_room = room + room / 8;
+  if (need > a->room) a->room = need + need / SLACK;
+  if (room > a->held_room) a->held_room = room + room / SLACK;
   return REMAP_OK;
 }
 
@@ -194,7 +196,7 @@ static remap_status find_giver(rm_arrivals *a, int32_t rank, rm_lid cell, rm_lid
   }
   RM_TRY(reserve(&a->giver_rank, a->giver_room, a->num_givers + 1, sizeof *a->giver_rank));
   RM_TRY(reserve(&a->giver_cell, a->giver_room, a->num_givers + 1, sizeof *a->giver_cell));
-  if (a->num_givers + 1 > a->giver_room) a->giver_room = a->num_givers + 1 + (a->num_givers + 1) / 8;
+  if (a->num_givers + 1 > a->giver_room) a->giver_room = a->num_givers + 1 + (a->num_givers + 1) / SLACK;
   *out                = (rm_lid)a->num_givers++;
   a->giver_rank[*out] = rank;
   a->giver_cell[*out] = cell;
@@ -351,6 +353,8 @@ void rm_arrivals_permute(rm_arrivals *a, rm_lid *place)
 {
   entry kept, moved;
 
+  free(a->receiver);
+  a->receiver = NULL;
   for (int64_t k = 0; k < a->num; k++) {
     int64_t at = k;
 

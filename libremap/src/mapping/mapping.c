@@ -121,23 +121,21 @@ static remap_status order_pairs(rm_arena *scratch, const job *j, const rm_arriva
   return REMAP_OK;
 }
 
-/* The same, in memory that ends here, and then the pairs in that order. Collective. */
-static remap_status arrange(job *j, rm_arrivals *a, remap_side side, rm_lid **place)
+/* The same, in memory that ends here, and then the pairs in that order; place [pairs]. Collective. */
+static remap_status arrange(job *j, rm_arrivals *a, remap_side side, rm_lid *place)
 {
   rm_rows     *rows    = &j->mapping->rows[side];
   rows_draft  *draft   = &j->draft[side];
   rm_arena    *scratch = rm_arena_new();
   double      *volume;
-  remap_status status = scratch ? REMAP_OK : REMAP_NO_MEMORY;
+  remap_status status  = rm_comm_agree(j->comm, scratch && place ? REMAP_OK : REMAP_NO_MEMORY, NULL);
 
-  *place = rm_arena_alloc(j->passing, a->num, sizeof **place);
-  if (!*place) status = REMAP_NO_MEMORY;
-  RM_GOTO(done, status = rm_comm_agree(j->comm, status, NULL));
+  RM_GOTO(done, status);
   RM_GOTO(done, status = fetch_givers(scratch, j->comm, j->mesh[1 - side], rows, draft, &volume));
-  status = rm_comm_agree(j->comm, order_pairs(scratch, j, a, rows, draft, volume, *place), NULL);
+  status = rm_comm_agree(j->comm, order_pairs(scratch, j, a, rows, draft, volume, place), NULL);
 done:
   rm_arena_drop(scratch);
-  if (status == REMAP_OK) rm_arrivals_permute(a, *place);
+  if (status == REMAP_OK) rm_arrivals_permute(a, place);
   return status;
 }
 
@@ -235,16 +233,21 @@ static remap_status make_rows(job *j, rm_arrivals *a, remap_side side)
   rm_rows     *rows   = &j->mapping->rows[side];
   rows_draft  *draft  = &j->draft[side];
   remap_status status = new_rows(j->arena, j->mesh[side]->num_cells, draft);
+  rm_arena    *passing;
   rm_lid      *place;
 
   rows->num_cells = j->mesh[side]->num_cells;
   if (status == REMAP_OK) status = sort_givers(j->arena, a, draft, rows);
   RM_TRY(rm_comm_agree(j->comm, status, NULL));
   RM_TRY(rm_plan_build(j->comm, j->arena, rows->num_givers, draft->giver_rank, draft->giver_cell, &rows->plan));
-  RM_TRY(arrange(j, a, side, &place));
-  RM_TRY(rm_comm_agree(j->comm, fill_rows(j, a, side, place), NULL));
+  passing = rm_arena_new();
+  place   = passing ? rm_arena_alloc(passing, a->num, sizeof *place) : NULL;
+  RM_GOTO(done, status = arrange(j, a, side, place));
+  status = rm_comm_agree(j->comm, fill_rows(j, a, side, place), NULL);
   publish(draft, rows);
-  return REMAP_OK;
+done:
+  rm_arena_drop(passing);
+  return status;
 }
 
 /* 1 for each covered cell with a single pair that has its volume. (Where no skin passes through a cell, that is its own volume

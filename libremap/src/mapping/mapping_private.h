@@ -31,8 +31,8 @@ struct rm_gathering {
 /* Give the list of givers back; pairs keep their numbers. */
 void rm_arrivals_forget_givers(rm_arrivals *a);
 
-/* Take element place[k] of the arrivals' arrays to k, for all k but in receiver; place [num] stays as it is. O(num) time, in
- * place. */
+/* Take element place[k] of the arrivals' arrays to k, for all k; receivers, which the order of rows tells, are given back.
+ * place [num] stays as it is. O(num) time, in place. */
 void rm_arrivals_permute(rm_arrivals *a, rm_lid *place);
 
 #endif

@@ -104,7 +104,8 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
   RM_NEW(node, arena, num_corners);
   RM_NEW(cell, arena, num_faces);
   RM_NEW(is_skin, arena, num_faces);
-  RM_NEW(given, arena, num_faces);
+  given = NULL; /* numbers ascend: if the last is its place, all are */
+  if (num_faces < loops->num || (num_faces > 0 && loops->given[num_faces - 1] >= num_faces)) RM_NEW(given, arena, num_faces);
   memset(new_node, -1, (size_t)loops->num_nodes * sizeof *new_node);
   num_faces = 0;
   offset[0] = num_corners = 0;
@@ -118,7 +119,7 @@ static remap_status copy_faces(rm_arena *arena, const rm_loops *loops, rm_lid *n
     }
     memcpy(cell[num_faces], loops->cell[f], sizeof cell[num_faces]);
     is_skin[num_faces]  = loops->is_skin[f];
-    given[num_faces]    = loops->given[f];
+    if (given) given[num_faces] = loops->given[f];
     offset[++num_faces] = num_corners;
   }
   out->num_faces    = num_faces;

@@ -30,7 +30,7 @@ typedef struct rm_mesh {
   const rm_lid   *face_node;        /* [face_offset[num_faces]]                                            */
   const rm_lid  (*face_cell)[2];    /* [num_faces] owner, neighbour or -1                                  */
   const uint8_t  *face_is_skin;     /* [num_faces] 1: no cell beside it on any rank or in any zone         */
-  const rm_lid   *face_given;       /* [num_faces] the caller's number                                     */
+  const rm_lid   *face_given;       /* [num_faces] the caller's number; NULL: all are as given             */
   const int64_t  *cell_face_offset; /* [num_cells + 1]                                                     */
   const rm_lid   *cell_face;        /* [cell_face_offset[num_cells]]                                       */
   const rm_gid   *cell_global;      /* [num_cells]                                                         */
@@ -42,6 +42,12 @@ typedef struct rm_mesh {
   rm_gid          worst_inverted;   /* over all ranks: the one of most negative volume, -1 if there is none */
   double          volume;           /* over all ranks: exact sum of abs(cell_volume), rounded once         */
 } rm_mesh;
+
+/* The caller's number of a face. */
+static inline rm_lid rm_given_face(const rm_mesh *mesh, rm_lid face)
+{
+  return mesh->face_given ? mesh->face_given[face] : face;
+}
 
 /* Agree on the frame of both meshes. Collective. BAD_MESH with the reason if a coordinate is not finite. mesh[] may lie about
  * counts: they are checked here before anything is read (NULL arrays, negative counts, offsets that do not ascend). */

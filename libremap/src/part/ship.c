@@ -118,7 +118,7 @@ static void pack_face(packing *p, int r, rm_lid f, wire_face *face, rm_lid *corn
   face->cell[0]   = owner >= 0 ? owner : other;
   face->cell[1]   = owner >= 0 ? other : -1;
   face->is_skin   = p->mesh->face_is_skin[f];
-  face->home      = p->mesh->face_given[f];
+  face->home      = rm_given_face(p->mesh, f);
   for (rm_lid i = 0; i < num; i++) {
     const rm_lid node = loop[owner >= 0 ? i : num - 1 - i];
 

@@ -100,7 +100,7 @@ static remap_status take_colour(rm_arena *passing, rm_arena *arena, const work *
     for (int64_t k = 0; k < n; k++) g->face_node[corners + k] = m->face_node[first + (is_turned ? n - 1 - k : k)];
     g->face_owner[faces]     = is_turned ? other : owner;
     g->face_neighbour[faces] = is_turned ? -1 : other;
-    g->face[faces]           = (rm_origin){-1, m->face_given[f], rank};
+    g->face[faces]           = (rm_origin){-1, rm_given_face(m, f), rank};
     g->face_offset[++faces]  = corners += n;
   }
   g->mesh.num_faces = faces;

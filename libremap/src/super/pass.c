@@ -31,7 +31,7 @@ static remap_status add_cells(work *w)
     rm_lid         most = -1;
 
     RM_NEW(w->soup_cell[side], w->scratch, m->num_cells);
-    for (rm_lid f = 0; f < m->num_faces; f++) most = m->face_given[f] > most ? m->face_given[f] : most;
+    for (rm_lid f = 0; f < m->num_faces; f++) most = rm_given_face(m, f) > most ? rm_given_face(m, f) : most;
     RM_NEW0(w->is_sent[side], w->scratch, (int64_t)most + 1);
     for (rm_lid c = 0; c < m->num_cells; c++) {
       rm_soup_cell cell = {{-1, -1}, {-1, -1}, {-1, -1}, m->cell_volume[c]};
@@ -167,14 +167,14 @@ static remap_status add_faces(work *w, int side)
     rm_lid        cell[2];
 
     for (int h = 0; h < 2; h++) cell[h] = m->face_cell[f][h] < 0 ? -1 : w->soup_cell[side][m->face_cell[f][h]];
-    if (cell[0] < 0 || (cell[1] < 0 && m->face_cell[f][1] >= 0) || w->is_sent[side][m->face_given[f]]) continue;
+    if (cell[0] < 0 || (cell[1] < 0 && m->face_cell[f][1] >= 0) || w->is_sent[side][rm_given_face(m, f)]) continue;
     for (int64_t k = first; k < first + n; k++) {
       rm_lid *v = &vertex[m->face_node[k]];
       if (*v < 0) RM_TRY(rm_soup_add_corner(w->soup, m->node_xyz[m->face_node[k]], v));
       RM_TRY(rm_soup_add_to_loop(w->soup, *v));
     }
     rm_soup_face face = {0, {cell[0], cell[1]}, {-1, -1}, {-1, -1}};
-    face.from[side]      = m->face_given[f];
+    face.from[side]      = rm_given_face(m, f);
     face.from_rank[side] = rank;
     RM_TRY(rm_soup_end_face(w->soup, face));
   }

@@ -1,0 +1,104 @@
+/* What remap_build holds at most, and afterwards, per cell and per pair: the library's memory is counted by the linker's
+ * --wrap. */
+#include "api/context.h"
+#include "meshes.h"
+#include "rt.h"
+
+#include <malloc.h>
+
+static size_t held, most;
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__real_realloc(void *old, size_t size);
+void *__real_aligned_alloc(size_t alignment, size_t size);
+void  __real_free(void *memory);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t n, size_t size);
+void *__wrap_realloc(void *old, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+void  __wrap_free(void *memory);
+
+static void *taken(void *memory)
+{
+  held += malloc_usable_size(memory);
+  most = held > most ? held : most;
+  return memory;
+}
+void *__wrap_malloc(size_t size) { return taken(__real_malloc(size)); }
+void *__wrap_calloc(size_t n, size_t size) { return taken(__real_calloc(n, size)); }
+void *__wrap_aligned_alloc(size_t alignment, size_t size) { return taken(__real_aligned_alloc(alignment, size)); }
+void *__wrap_realloc(void *old, size_t size)
+{
+  const size_t before = malloc_usable_size(old);
+  void        *memory = __real_realloc(old, size);
+
+  if (memory) held -= before;
+  return memory ? taken(memory) : NULL;
+}
+void __wrap_free(void *memory)
+{
+  held -= malloc_usable_size(memory);
+  __real_free(memory);
+}
+
+/* Bytes per target cell at the peak of a build of two warped grids of about n^3 cells, and after it; pairs per target cell. */
+typedef struct amounts {
+  double peak, kept, pairs;
+} amounts;
+
+static amounts build(int n, remap_faces faces, int64_t triangles)
+{
+  tm_mesh       *mesh[2];
+  remap_options  options;
+  remap_context *ctx = NULL;
+  remap_stats    stats;
+  size_t         before;
+
+  remap_options_default(&options);
+  options.faces = faces;
+  for (int side = 0; side < 2; side++)
+    mesh[side] = tm_hexahedra((int[]){n + side, n + side, n + side}, tm_warp, &(tm_warping){.03, side ? .1 : .7});
+  RT_EQ(remap_create(MPI_COMM_WORLD, &options, &ctx), REMAP_OK);
+  ctx->slicing.triangles = triangles;
+  for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, side, &mesh[side]->view), REMAP_OK);
+  before = most = held;
+  RT_EQ(remap_build(ctx), REMAP_OK);
+  const double cells = (double)mesh[1]->view.num_cells, peak = (double)(most - before), kept = (double)(held - before);
+  RT_EQ(remap_get_stats(ctx, &stats), REMAP_OK);
+  remap_destroy(&ctx);
+  for (int side = 0; side < 2; side++) tm_free(mesh[side]);
+  return (amounts){peak / cells, kept / cells, (double)stats.pairs / cells};
+}
+
+/* As with 80,000 triangles at 40^3 cells, where shared blocks of arenas count for less. */
+static void a_build_of_warped_grids_stays_within_its_bounds(void)
+{
+  static const double most_bytes[2] = {[REMAP_FACES_CENTRE] = 2000, [REMAP_FACES_DIAGONAL] = 1300};
+
+  for (int faces = REMAP_FACES_CENTRE; faces <= REMAP_FACES_DIAGONAL; faces++) {
+    const amounts a = build(24, (remap_faces)faces, 18000);
+
+    if (!RT_CHECK(a.peak <= most_bytes[faces])) printf("# peak %.0f, kept %.0f bytes per target cell\n", a.peak, a.kept);
+  }
+}
+
+/* Meshes and pairs are all that is kept: 48 bytes per pair, and 650 per cell of both meshes together. */
+static void what_is_kept_is_meshes_and_pairs(void)
+{
+  const amounts a = build(16, REMAP_FACES_DIAGONAL, 10000), b = build(24, REMAP_FACES_DIAGONAL, 18000);
+
+  RT_CHECK(b.kept <= 48 * b.pairs + 650);
+  RT_CHECK(a.pairs > 7 && b.pairs > 7);
+  if (!RT_CHECK(b.kept <= a.kept)) printf("# kept %.0f and %.0f bytes per target cell\n", a.kept, b.kept);
+}
+
+static void without_blocks_the_peak_is_that_of_a_whole_overlay(void)
+{
+  const amounts whole = build(16, REMAP_FACES_DIAGONAL, INT64_MAX), blocks = build(16, REMAP_FACES_DIAGONAL, 5000);
+
+  RT_CHECK(whole.peak > 2 * blocks.peak); /* so the bounds above see blocks at work */
+}
+
+RT_MAIN(RT_CASE(a_build_of_warped_grids_stays_within_its_bounds), RT_CASE(what_is_kept_is_meshes_and_pairs),
+        RT_CASE(without_blocks_the_peak_is_that_of_a_whole_overlay))
