@@ -176,8 +176,8 @@ static remap_status explain(const rm_comm *comm, const rm_conformed whole[2], re
   for (int side = 0; side < 2 && status == REMAP_BAD_MESH; side++) {
     if (!(whole[side].overlap > 0)) continue;
     *reason = (rm_reason){side, reason->side == side ? reason->global_cell : -1,
-                          "its zones overlap by rounding, and parts of cells that two of them hold are too thin to be told from "
-                          "it: let nodes agree where zones touch, or choose one of the zones"};
+                          "its zones overlap by rounding, and parts of cells that two of them hold are too thin to be told "
+                          "from it: let nodes agree where zones touch, or choose one of the zones"};
     break;
   }
   return status;
