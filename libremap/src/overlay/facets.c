@@ -1,7 +1,6 @@
 /* facets -- see facets.h. O(n) time; 21 bytes per triangle and 8 per panel, and nothing at all where no face is whole. */
 #include "overlay/facets.h"
 
-
 /* ---- joining ----------------------------------------------------------------------------------------------------- */
 
 enum { UNSEEN = -1, ALONE = -2, UNLIKE = -3 }; /* what meets a side of a whole face, if it is not one other such side */
@@ -143,12 +142,11 @@ static inline bool is_quadrangle(const rm_trimesh *m, rm_lid t)
 /* Corners of a quadrangle called by t, v being those of t; s is its other triangle, w those of s. */
 static void corners_of_two(const rm_trimesh *m, rm_lid t, const uint8_t v[3], rm_lid s, const uint8_t w[3], uint8_t out[4])
 {
-  static const uint8_t place[3] = {1, 2, 3}; /* of the new corner, between the ends of edge h */
-  int                  h = 0, k = 0, n = 0;
+  int h = 0, k = 0, n = 0;
 
   while (!rm_is_inner(m, t, h)) h++;
   while (!rm_is_inner(m, s, k)) k++;
-  for (int c = 0; c < 4; c++) out[c] = c == place[h] ? w[opposite(k)] : v[n++];
+  for (int c = 0; c < 4; c++) out[c] = c == h + 1 ? w[opposite(k)] : v[n++]; /* the new corner between the ends of edge h */
 }
 
 /* Write the panels of cell c from place n on; returns the place behind them. place[triangle] is scratch. */

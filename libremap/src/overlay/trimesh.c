@@ -1,7 +1,7 @@
 /* trimesh -- triangulates a piece of a mesh and puts it in canonical order (DESIGN 2.1, 2.5).
  *
  * Points are sorted by Morton key, triangles and edges are bucketed by their lowest vertex: O(n) time. About 800 bytes per
- * hexahedron with `diagonal`, 1600 with `centre`. */
+ * hexahedron with `diagonal`, 1600 with `centre`, 200 more than the former where all faces are planar. */
 #include "overlay/facets.h"
 
 #include <math.h>
