@@ -63,17 +63,21 @@ static remap_status misfit(const work *w, rm_label a, rm_label b)
 static bool join_few(work *w, const rm_arc *arc, rm_lid n)
 {
   uint64_t key[2 * FEW];
-  rm_lid   partner[2 * FEW];
+  rm_lid   pair[FEW][2], num = 0;
+  unsigned done = 0; /* bits */
 
   for (rm_lid k = 0; k < 2 * n; k++) key[k] = label_key(label_of(w, side_of(&arc[k / 2], k & 1)));
   for (rm_lid k = 0; k < 2 * n; k++) {
     int times = 0;
-    for (rm_lid m = 0; m < 2 * n && key[k]; m++)
-      if (m != k && key[m] == key[k]) partner[k] = m, times++;
-    if (key[k] && times != 1) return false;
+    if (!key[k] || done >> k & 1) continue;
+    for (rm_lid m = k + 1; m < 2 * n; m++)
+      if (key[m] == key[k]) pair[num][1] = m, times++;
+    if (times != 1) return false;
+    done |= 1u << pair[num][1];
+    pair[num++][0] = k;
   }
-  for (rm_lid k = 0; k < 2 * n; k++)
-    if (key[k] && partner[k] > k) join(w, side_of(&arc[k / 2], k & 1), side_of(&arc[partner[k] / 2], partner[k] & 1));
+  for (rm_lid i = 0; i < num; i++)
+    join(w, side_of(&arc[pair[i][0] / 2], pair[i][0] & 1), side_of(&arc[pair[i][1] / 2], pair[i][1] & 1));
   return true;
 }
 

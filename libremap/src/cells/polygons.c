@@ -114,7 +114,8 @@ static remap_status add_arc(work *w, rm_lid from, rm_lid to, rm_lid left, rm_lid
 
   RM_TRY(node(w, from, &h[0].from));
   RM_TRY(node(w, to, &h[1].from));
-  RM_TRY(rm_grow(&w->half, &w->half_room, (int64_t)w->num_halves + 2, sizeof *w->half));
+  if (w->num_halves + 2 > w->half_room)
+    RM_TRY(rm_grow(&w->half, &w->half_room, (int64_t)w->num_halves + 2, sizeof *w->half));
   memcpy(w->half + w->num_halves, h, sizeof h);
   w->num_halves += 2;
   return REMAP_OK;
@@ -526,7 +527,8 @@ static bool same_way(const work *w, rm_lid b)
 
 static remap_status push_vertex(rm_polygons *out, rm_lid spot)
 {
-  RM_TRY(rm_grow(&out->vertex, &out->vertex_room, out->num_vertices + 1, sizeof *out->vertex));
+  if (out->num_vertices == out->vertex_room)
+    RM_TRY(rm_grow(&out->vertex, &out->vertex_room, out->num_vertices + 1, sizeof *out->vertex));
   out->vertex[out->num_vertices++] = spot;
   return REMAP_OK;
 }

@@ -5,7 +5,7 @@
  * the supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are
  * made of and not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and
  * numbered in one order. Zones of one mesh that touch without matching faces are joined first, in the same way. O(n log n)
- * time; on top of what room cells needs, some 400 bytes for each cell of the result while it is numbered. */
+ * time; on top of what room cells needs, some 650 bytes (centre) for each cell of the result while it is numbered. */
 #ifndef RM_SUPER_H
 #define RM_SUPER_H
 
