@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-enum { SAMPLES = 64, FEW = 24 };
+/* Samples of a rank: so many, but of all ranks together not many more than ALL_SAMPLES, which every rank sorts. */
+enum { SAMPLES = 64, LEAST_SAMPLES = 4, ALL_SAMPLES = 1 << 19, FEW = 24 };
 
 typedef struct keys {
   int             words;
@@ -81,14 +82,16 @@ typedef struct dealing {
 
 static remap_status prepare(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, dealing *d)
 {
-  keys k;
+  const int64_t share = ALL_SAMPLES / comm->size;
+  const int64_t most  = share > SAMPLES ? SAMPLES : share > LEAST_SAMPLES ? share : LEAST_SAMPLES;
+  keys          k;
 
   RM_TRY(start(passing, n, words, key, &k));
   RM_NEW(d->place, passing, n);
   d->num = rank_keys(&k, n, d->place);
   RM_NEW(d->distinct, passing, d->num * words);
   for (int64_t i = 0; i < n; i++) memcpy(d->distinct + d->place[i] * words, key + i * words, sizeof *key * (size_t)words);
-  d->num_samples = d->num < SAMPLES ? d->num : SAMPLES;
+  d->num_samples = d->num < most ? d->num : most;
   for (int64_t s = 0; s < d->num_samples; s++)
     memcpy(d->sample + s * words, d->distinct + d->num * s / d->num_samples * words, sizeof *key * (size_t)words);
   RM_NEW(d->send_offset, passing, (int64_t)comm->size + 1);
