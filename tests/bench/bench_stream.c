@@ -10,8 +10,8 @@
  * The streams. `bytes_pairs`: the pairs' arrays, once: number of the giver (4) and V (8), order 2 and systems M (24), order 3
  * and systems second moments (48); and per field what giving cells give, a value (8) and slopes (24), and what receiving cells
  * receive (8). `bytes_plan`: these and, from order 2 on, the stencil, once: number (4) and weights (24) of every vertex
- * neighbour of every giving cell; order 3 another 4 + 72. `ratio_more` is one more field against bytes_pairs; `ratio_one`, a
- * field by itself against bytes_plan, is what no limiter can get below 1 by sharing. */
+ * neighbour of every giving cell; order 3 another 4 + 72. `ratio_more` is one more field against bytes_pairs, which fields of a
+ * call share, so that it may be below 1; `ratio_one` is a field by itself against bytes_plan, all of which it reads. */
 #include <remap/remap.h>
 #include "bench.h"
 
