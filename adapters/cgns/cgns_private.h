@@ -10,6 +10,7 @@
  *   sids_rows.c  rows of sections that have no index
  *   sids_mesh.c  this rank's part of the mesh
  *   sids_dual.c  the cells about its vertices instead
+ *   sids_elements.c  its elements of unstructured zones
  *   sids_poly.c  its polyhedra: NGON_n, NFACE_n, ParentElements
  *   sids_bc.c      BC_t: which faces are on which boundary
  *   sids_gas.c     FlowEquationSet_t and ReferenceState_t: the gas
@@ -355,6 +356,12 @@ rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *
                             double *xyz, uint8_t *shared, rcgns_message *message);
 /* One face into the mesh: a loop of local nodes, false: no memory. */
 bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour);
+/* Corners of the faces of a hexahedron, outward. */
+enum { RC_HEXA_FACES = 6, RC_HEXA_CORNERS = 8 };
+extern const int8_t rc_hexa_face[RC_HEXA_FACES][4];
+/* Cells [lo, hi) of an unstructured zone, whatever its sections are; first_cell is the local number of cell lo. Collective. */
+rcgns_status rc_sections_build(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, int64_t first_cell,
+                               rcgns_message *message);
 /* Faces of the cells [lo, hi) (numbers in the zone) of polyhedra; first_cell is the local number of cell lo. Collective. */
 rcgns_status rc_poly_build(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
                            int64_t first_cell, rcgns_message *message);
