@@ -4,6 +4,7 @@
  *   static void one_and_one_are_two(void) { RT_EQ(1 + 1, 2); }
  *   RT_MAIN(RT_CASE(one_and_one_are_two))
  *
+ * RT_ALONE instead of RT_CASE is for what runs on MPI_COMM_SELF: it is skipped on several ranks, which would all do the same.
  * An argument picks the cases whose name contains it. The exit status is 0 if at least one case ran and all that ran hold,
  * 77 if every case that ran was skipped, else 1. */
 #ifndef RT_H
@@ -21,6 +22,7 @@
 typedef struct rt_case {
   const char *name;
   void (*run)(void);
+  int alone; /* not 0: each rank would do the same, so more than one skip it */
 } rt_case;
 
 static int rt_failed_, rt_skipped_, rt_rank_, rt_size_;
@@ -137,7 +139,10 @@ static inline int rt_main_(int argc, char **argv, const rt_case *cases, int num_
 
     if (argc > 1 && !strstr(cases[i].name, argv[1])) continue;
     rt_failed_ = rt_skipped_ = 0;
-    cases[i].run();
+    if (cases[i].alone && rt_size_ > 1)
+      rt_skip("each rank would do the same");
+    else
+      cases[i].run();
     mine[0] = rt_failed_;
     mine[1] = rt_skipped_;
     MPI_Allreduce(mine, all, 2, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
@@ -152,7 +157,8 @@ static inline int rt_main_(int argc, char **argv, const rt_case *cases, int num_
   if (ran == 0 || held < ran || leaks) return 1;
   return skipped == ran ? 77 : 0;
 }
-#define RT_CASE(name) {#name, name}
+#define RT_CASE(name)  {#name, name, 0}
+#define RT_ALONE(name) {#name, name, 1}
 #define RT_MAIN(...)                                                         \
   int main(int argc, char **argv)                                            \
   {                                                                          \
