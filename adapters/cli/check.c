@@ -216,18 +216,19 @@ static void judge(cli_job *j, const double largest[NUM_FIELDS], const double mea
   j->report.check[j->report.num_checks++] = (cli_check_row){"bounds", fmax(beyond, 0), CLI_MAX_BEYOND, false};
 }
 
-/* One line that names the figures that fail. */
-static cli_exit say_failures(const cli_job *j, cli_failure *why)
+/* One line that names the figures that fail, and a cell that is to blame. Collective. */
+static cli_exit say_failures(cli_job *j, cli_failure *why)
 {
-  char   names[200] = "";
+  char   names[200] = "", words[600];
   size_t length     = 0;
 
   for (int i = 0; i < j->report.num_checks; i++)
     if (!cli_check_passes(&j->report.check[i]))
       length += (size_t)snprintf(names + length, sizeof names - length, "%s %s", length ? "," : "", j->report.check[i].name);
   if (!length) return CLI_DONE;
-  return cli_fail(why, CLI_VERIFY, "%s onto %s: the check fails in%s: refine the coarser mesh, or see whether one folds",
-                  j->options.path[REMAP_SOURCE], j->options.path[REMAP_TARGET], names);
+  CLI_TRY(cli_blame(j, "refine the coarser mesh, or see whether one folds", words, sizeof words, why));
+  return cli_fail(why, CLI_VERIFY, "%s onto %s: the check fails in%s: %s", j->options.path[REMAP_SOURCE],
+                  j->options.path[REMAP_TARGET], names, words);
 }
 
 /* Room for one side, and the cells. */

@@ -124,6 +124,10 @@ void cli_masks_fill(cli_job *j);
  *  Errors: VERIFY, INTERNAL. */
 cli_exit cli_verify(cli_job *j, cli_failure *why);
 
+/** What to look at where fields are not conserved or constants do not stay: the cell whose parts cancel most, to the remarks
+ *  too, or what is said otherwise. words gets size characters at most. Collective, after remap_build. Errors: INTERNAL. */
+cli_exit cli_blame(cli_job *j, const char *otherwise, char *words, size_t size, cli_failure *why);
+
 /** Write the supermesh that was asked for, after remap_build: fills supermesh of the report. Collective. Errors: GEOMETRY, IO,
  *  INTERNAL. */
 cli_exit cli_supermesh_write(cli_job *j, cli_failure *why);

@@ -55,10 +55,9 @@ static cli_exit worst_hollow(const cli_job *j, remap_side side, hollow *out, cli
   return CLI_DONE;
 }
 
-/* What to look at where a field is not conserved: words for the message and a remark for the report. Collective. */
-static cli_exit blame(cli_job *j, char *words, size_t size, cli_failure *why)
+cli_exit cli_blame(cli_job *j, const char *otherwise, char *words, size_t size, cli_failure *why)
 {
-  snprintf(words, size, "see whether a mesh folds");
+  snprintf(words, size, "%s", otherwise);
   for (int side = 0; side < 2; side++) {
     const rcgns_info *info = j->report.info[side];
     hollow            h;
@@ -100,7 +99,7 @@ cli_exit cli_verify(cli_job *j, cli_failure *why)
     char         words[600];
 
     if (error <= CLI_MAX_CONSERVATION || (j->options.allow_nan && isnan(error))) continue;
-    CLI_TRY(blame(j, words, sizeof words, why));
+    CLI_TRY(cli_blame(j, "see whether a mesh folds", words, sizeof words, why));
     return cli_fail(why, CLI_VERIFY, "%s: field %s is conserved only within %.1e, the bar is %.0e: nothing is written; %s",
                     j->options.path[REMAP_SOURCE], j->row[k].name, error, CLI_MAX_CONSERVATION, words);
   }

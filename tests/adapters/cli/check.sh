@@ -38,6 +38,10 @@ fails 2 4 "wide.cgns.*half.cgns.*order" wide.cgns half.cgns --check --report rep
 grep -q "^order .*FAIL$" stdout || complain "no FAIL"
 [ "$(value check 2 pass)" = false ] || complain "the report does not tell"
 hold "$wrong" "cells too wide for the order fail with status 4"
+fails 2 4 "wide.cgns.*bow_tie.cgns.*order.*zone Base/Zone: cell 1 .*inside out" wide.cgns bow_tie.cgns --check \
+  --report report.json
+grep -q "bow_tie.cgns: zone Base/Zone: cell 1 .*inside out" report.json || complain "the report does not tell"
+hold "$wrong" "a cell whose parts cancel is named"
 fails 1 3 "do not meet" good.cgns far.cgns --check
 hold $? "meshes that do not meet are told apart"
 fails 1 2 "leave -o" good.cgns mesh.cgns --check -o out/result.cgns
