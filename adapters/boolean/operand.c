@@ -224,7 +224,7 @@ cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_con
   *out = (bool_content){.content = {.mesh = view, .ancestor = {"AncestorA", "AncestorB"}}};
   CLI_TRY(cli_boundaries_begin(comm, view->num_faces, operand[0].boundaries.num + operand[1].boundaries.num, b, why));
   for (int side = 0; side < 2; side++)
-    CLI_TRY(cli_boundaries_take(comm, ctx, (remap_side)side, &operand[side].mesh, &operand[side].boundaries, b, why));
+    CLI_TRY(cli_boundaries_take(comm, ctx, (remap_side)side, operand[side].mesh.num_faces, &operand[side].boundaries, b, why));
   out->content.num_boundaries = b->num;
   out->content.boundary_name  = b->name;
   out->content.boundary_type  = b->type;

@@ -27,10 +27,10 @@ static int32_t number_of(cli_boundaries *b, const char *name, const char *type)
   return i;
 }
 
-cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side, const remap_mesh *mesh,
+cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side, int64_t num_faces,
                              const rcgns_boundaries *from, cli_boundaries *to, cli_failure *why)
 {
-  int32_t     *mine   = malloc(((size_t)mesh->num_faces + 1) * sizeof *mine);
+  int32_t     *mine   = malloc(((size_t)num_faces + 1) * sizeof *mine);
   int32_t     *taken  = malloc(((size_t)to->num_faces + 1) * sizeof *taken);
   int32_t     *number = calloc((size_t)from->num + 1, sizeof *number);
   cli_exit     code   = cli_agree_on(comm, mine && taken && number ? CLI_DONE : cli_no_memory(why), why);
@@ -38,12 +38,11 @@ cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side,
 
   for (int b = 0; code == CLI_DONE && b < from->num; b++)
     number[b] = number_of(to, from->name[b], from->type ? from->type[b] : "UserDefined");
-  for (int64_t f = 0; code == CLI_DONE && f < mesh->num_faces; f++)
+  for (int64_t f = 0; code == CLI_DONE && f < num_faces; f++)
     mine[f] = from->face && from->face[f] >= 0 ? number[from->face[f]] : -1;
   if (code == CLI_DONE) {
     status = remap_supermesh_face_values(ctx, side, mine, -1, taken);
-    if (status != REMAP_OK)
-      code = cli_fail(why, CLI_INTERNAL, "%s: %s", mesh->name ? mesh->name : "a mesh", remap_status_text(status));
+    if (status != REMAP_OK) code = cli_fail(why, CLI_INTERNAL, "boundaries of a supermesh: %s", remap_status_text(status));
   }
   for (int64_t f = 0; code == CLI_DONE && f < to->num_faces; f++)
     if (to->face[f] < 0) to->face[f] = taken[f];

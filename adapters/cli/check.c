@@ -24,9 +24,11 @@ typedef struct known {
       per_extent[3]; /* [d] of the box; 1 / extent, 0 where a mesh is one layer of cells: nothing varies along it */
 } known;
 
-/* One side: its cells and the fields' means. */
+/* One side: its cells, block after block, and the fields' means. */
 typedef struct check_side {
-  const remap_mesh *mesh;
+  int               num_blocks;
+  const remap_mesh *block; /* [num_blocks] */
+  int64_t           num_cells;
   double           *volume, *centre, *mean[NUM_FIELDS]; /* [cells], [cells][3], [cells] each */
 } check_side;
 
@@ -83,32 +85,47 @@ static void add_tetrahedron(const known *k, const double *apex, const double *a,
   sum[2] += volume;
 }
 
+/* An entry of an array that is there with 64 or with 32 bits. */
+static int64_t entry(const int64_t *wide, const int32_t *narrow, int64_t i) { return wide ? wide[i] : narrow[i]; }
+
+/* Corner i of a face that begins at entry `first` of the loops. */
+static const double *corner(const remap_mesh *m, int64_t first, int64_t i)
+{
+  return m->node_xyz + 3 * entry(m->face_node, m->face_node32, first + i);
+}
+
 /* Add a face to the integrals of a cell; sign -1 if its normal points into it. */
 static void add_face(const known *k, const remap_mesh *m, int64_t face, const double *apex, double sign, double sum[3])
 {
-  const int64_t *node = m->face_node + m->face_offset[face], n = m->face_offset[face + 1] - m->face_offset[face];
-  double         middle[3] = {0, 0, 0}, part[3] = {0, 0, 0};
+  const int64_t first     = entry(m->face_offset, m->face_offset32, face);
+  const int64_t n         = entry(m->face_offset, m->face_offset32, face + 1) - first;
+  double        middle[3] = {0, 0, 0}, part[3] = {0, 0, 0};
 
   for (int64_t i = 0; i < n; i++)
-    for (int d = 0; d < 3; d++) middle[d] += m->node_xyz[3 * node[i] + d] / (double)n;
+    for (int d = 0; d < 3; d++) middle[d] += corner(m, first, i)[d] / (double)n;
   for (int64_t i = 0; i < n; i++)
-    add_tetrahedron(k, apex, middle, m->node_xyz + 3 * node[i], m->node_xyz + 3 * node[i + 1 < n ? i + 1 : 0], part);
+    add_tetrahedron(k, apex, middle, corner(m, first, i), corner(m, first, i + 1 < n ? i + 1 : 0), part);
   for (int i = 0; i < 3; i++) sum[i] += sign * part[i];
 }
 
 /* The means of all fields over the cells of one side. sum has room for [cells][3]. */
 static void find_means(const known *k, check_side *s, double *sum)
 {
-  const remap_mesh *m = s->mesh;
+  int64_t first = 0; /* cell of the block */
 
-  memset(sum, 0, 3 * (size_t)m->num_cells * sizeof *sum);
-  for (int64_t f = 0; f < m->num_faces; f++) {
-    const int64_t own = m->face_owner[f], other = m->face_neighbour[f];
+  memset(sum, 0, 3 * (size_t)s->num_cells * sizeof *sum);
+  for (int b = 0; b < s->num_blocks; first += s->block[b++].num_cells) {
+    const remap_mesh *m = &s->block[b];
 
-    add_face(k, m, f, s->centre + 3 * own, 1, sum + 3 * own);
-    if (other >= 0) add_face(k, m, f, s->centre + 3 * other, -1, sum + 3 * other);
+    for (int64_t f = 0; f < m->num_faces; f++) {
+      const int64_t own   = first + entry(m->face_owner, m->face_owner32, f);
+      const int64_t other = entry(m->face_neighbour, m->face_neighbour32, f);
+
+      add_face(k, m, f, s->centre + 3 * own, 1, sum + 3 * own);
+      if (other >= 0) add_face(k, m, f, s->centre + 3 * (first + other), -1, sum + 3 * (first + other));
+    }
   }
-  for (int64_t c = 0; c < m->num_cells; c++) {
+  for (int64_t c = 0; c < s->num_cells; c++) {
     const double *x = s->centre + 3 * c, *whole = sum + 3 * c;
 
     s->mean[CONSTANT][c]   = 1.7;
@@ -127,7 +144,7 @@ static cli_exit find_ends(const cli_job *j, remap_side which, const check_side *
 {
   CLI_TRY(cli_from_remap(j, remap_coverage(j->ctx, which, NULL, cover), why));
   for (int i = 0; i < 6; i++) end[i] = -DBL_MAX;
-  for (int64_t c = 0; c < s->mesh->num_cells; c++)
+  for (int64_t c = 0; c < s->num_cells; c++)
     for (int d = 0; d < 3 && (cover[c] == REMAP_COVERED || cover[c] == REMAP_PARTIAL); d++) {
       end[d]     = fmax(end[d], -s->centre[3 * c + d]);
       end[3 + d] = fmax(end[3 + d], s->centre[3 * c + d]);
@@ -189,7 +206,7 @@ static void find_errors(const cli_job *j, const check_side *target, double *cons
   int64_t      whole[NUM_FIELDS] = {0};
 
   for (int i = 0; i < NUM_FIELDS; i++) largest[i] = 0;
-  for (int64_t c = 0; c < target->mesh->num_cells; c++)
+  for (int64_t c = 0; c < target->num_cells; c++)
     for (int i = 0; i < NUM_FIELDS && (cover[c] == REMAP_COVERED || cover[c] == REMAP_PARTIAL); i++) {
       const double error = fabs(out[i][c] - target->mean[i][c]);
 
@@ -234,13 +251,13 @@ static cli_exit say_failures(cli_job *j, cli_failure *why)
 /* Room for one side, and the cells. */
 static cli_exit open_side(cli_job *j, remap_side which, check_side *s, cli_failure *why)
 {
-  const remap_mesh *m = rcgns_mesh(j->file[which]);
-  const size_t      n = (size_t)m->num_cells;
-  cli_exit          mine;
+  const size_t n = (size_t)cli_num_cells(j, which);
+  cli_exit     mine;
 
-  s->mesh   = m;
-  s->volume = malloc((4 + NUM_FIELDS) * (n + 1) * sizeof *s->volume);
-  mine      = cli_agree(j, s->volume ? CLI_DONE : cli_no_memory(why), why);
+  s->block     = cli_blocks(j, which, &s->num_blocks);
+  s->num_cells = (int64_t)n;
+  s->volume    = malloc((4 + NUM_FIELDS) * (n + 1) * sizeof *s->volume);
+  mine         = cli_agree(j, s->volume ? CLI_DONE : cli_no_memory(why), why);
   CLI_TRY(mine);
   s->centre = s->volume + n;
   for (int i = 0; i < NUM_FIELDS; i++) s->mean[i] = s->volume + (4 + (size_t)i) * n;
@@ -256,7 +273,7 @@ static cli_exit check_sides(cli_job *j, check_side side[2], double *room, double
 
   CLI_TRY(find_box(j, side, cover, &k, why));
   for (int i = 0; i < 2; i++) find_means(&k, &side[i], room);
-  for (int i = 0; i < NUM_FIELDS; i++) out[i] = values + (size_t)i * (size_t)side[REMAP_TARGET].mesh->num_cells;
+  for (int i = 0; i < NUM_FIELDS; i++) out[i] = values + (size_t)i * (size_t)side[REMAP_TARGET].num_cells;
   CLI_TRY(carry(j, side, out, report, why));
   find_errors(j, &side[REMAP_TARGET], out, cover, largest, mean);
   judge(j, largest, mean, report);
@@ -265,7 +282,7 @@ static cli_exit check_sides(cli_job *j, check_side side[2], double *room, double
 
 cli_exit cli_check(cli_job *j, cli_failure *why)
 {
-  const int64_t num[2]  = {rcgns_mesh(j->file[0])->num_cells, rcgns_mesh(j->file[1])->num_cells};
+  const int64_t num[2]  = {cli_num_cells(j, REMAP_SOURCE), cli_num_cells(j, REMAP_TARGET)};
   const size_t  most    = (size_t)(num[0] > num[1] ? num[0] : num[1]) + 1;
   double       *room    = malloc((3 * most + NUM_FIELDS * ((size_t)num[REMAP_TARGET] + 1)) * sizeof *room);
   remap_cover  *cover   = malloc(most * sizeof *cover);

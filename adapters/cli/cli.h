@@ -6,6 +6,7 @@
  *   masks.c     which cells give and which want values
  *   volumes.c   cell volumes of the solvers
  *   priority.c  zones of SOURCE that overlap
+ *   pieces.c    what belongs to cells, of pieces of them
  *   coverage.c  how much of the cells is covered
  *   verify.c    is the result good enough to be written
  *   check.c     --check

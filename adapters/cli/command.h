@@ -75,9 +75,9 @@ typedef struct cli_boundaries {
 /** Begin without any, with room for the boundaries of both operands, `most` in all. Collective. Errors: INTERNAL. */
 cli_exit cli_boundaries_begin(MPI_Comm comm, int64_t num_faces, int most, cli_boundaries *out, cli_failure *why);
 
-/** Take those of one operand, whose part on this rank is mesh, over to the faces of the supermesh of ctx that lie in its faces;
- *  faces that have one keep it. Those of one name and type are one. Collective. Errors: INTERNAL. */
-cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side, const remap_mesh *mesh,
+/** Take those of one operand, which has num_faces on this rank, over to the faces of the supermesh of ctx that lie in its
+ *  faces; those that have one keep it. Those of one name and type are one. Collective. Errors: INTERNAL. */
+cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side, int64_t num_faces,
                              const rcgns_boundaries *from, cli_boundaries *to, cli_failure *why);
 
 /** Give them back; harmless on none. Not collective. */

@@ -89,18 +89,32 @@ cli_exit cli_priority_check(const cli_job *j, cli_failure *why);
 /** Does --priority name zones of that side? Not collective. */
 bool cli_has_priority(const cli_job *j, remap_side side);
 
-/** Where --priority names zones of SOURCE, cut those of lower priority: sets cut, and the values and the mask become those of
+/** Where --priority names zones of SOURCE, cut those of lower priority: sets cut, and values, mask and volumes become those of
  *  what is visible. After all of SOURCE is read. Collective. Errors: USAGE, GEOMETRY (cells that cannot be cut), INTERNAL. */
 cli_exit cli_priority_cut(cli_job *j, cli_failure *why);
 
 /** End a cut and set *cut to NULL. Collective, and harmless on NULL. */
 void cli_cut_drop(cli_cut **cut);
 
+/** How much of each cell of SOURCE's file is covered, [cells of rcgns_mesh]: of one that --priority cuts, its visible part
+ *  counts. After cli_coverage_find. Collective. Errors: INTERNAL. */
+cli_exit cli_source_share(cli_job *j, double *share, cli_failure *why);
+
+/** The boundaries of one side, for the num_faces faces that it lends, block after block. Collective. Errors: IO, INTERNAL. */
+cli_exit cli_side_boundaries(cli_job *j, remap_side side, rcgns_boundaries *out, int64_t *num_faces, cli_failure *why);
+
+/** The cells of SOURCE's file in which the cells of a supermesh lie, [num_cells of the view] global numbers or -1. Collective,
+ *  after the supermesh of ctx, whose ancestors are the cells that were lent. Errors: INTERNAL. */
+cli_exit cli_source_ancestors(cli_job *j, const remap_supermesh_view *view, int64_t *ancestor, cli_failure *why);
+
 /** How many cells of one side this rank lends to the library. Not collective. */
 int64_t cli_num_cells(const cli_job *j, remap_side side);
 
 /** Their global numbers, [cli_num_cells]. Owned by the job. Not collective. */
 const int64_t *cli_cells(const cli_job *j, remap_side side);
+
+/** The meshes that are lent, one block after the other. Owned by the job. Not collective. */
+const remap_mesh *cli_blocks(const cli_job *j, remap_side side, int *num_blocks);
 
 /** Lend one side to the library, with the solver's volumes. Not collective. */
 void cli_set_mesh(const cli_job *j, remap_context *ctx, remap_side side);

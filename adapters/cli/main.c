@@ -200,13 +200,17 @@ static cli_exit write_target(cli_job *j, cli_failure *why)
 /* SOURCE with psi. Collective. */
 static cli_exit write_source(cli_job *j, cli_failure *why)
 {
-  const char     *path = j->options.source_coverage;
-  rcgns_new_field psi  = {.name = CLI_COVERAGE_FIELD, .values = j->fraction[REMAP_SOURCE]};
+  const char     *path  = j->options.source_coverage;
+  double         *share = malloc(((size_t)rcgns_mesh(j->file[REMAP_SOURCE])->num_cells + 1) * sizeof *share);
+  rcgns_new_field psi   = {.name = CLI_COVERAGE_FIELD, .values = share};
+  cli_exit        mine  = cli_agree(j, share ? CLI_DONE : cli_no_memory(why), why);
   rcgns_message   message;
-  cli_exit        mine;
 
-  mine = cli_from_cgns(rcgns_write(j->file[REMAP_SOURCE], path, j->report.solution[REMAP_SOURCE], 1, &psi, &message), &message,
-                       why);
+  if (mine == CLI_DONE) mine = cli_source_share(j, share, why);
+  if (mine == CLI_DONE)
+    mine = cli_from_cgns(rcgns_write(j->file[REMAP_SOURCE], path, j->report.solution[REMAP_SOURCE], 1, &psi, &message),
+                         &message, why);
+  free(share);
   if (mine == CLI_DONE) j->report.source_coverage = path;
   return mine;
 }

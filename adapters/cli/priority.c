@@ -7,39 +7,15 @@
  * library the cells of the first class and the pieces of the others are the blocks of one mesh, and there are no zones that
  * overlap. Zones of TARGET may overlap once one of them is named: their cells get values one by one.
  *
- * Cost: for each class but the first one supermesh and one overlay of it. */
-#include "job.h"
+ * What else belongs to cells is told of pieces too (pieces.c), so that --check, --source-volume, --source-coverage and
+ * --supermesh take them like cells. Cost: for each class but the first one supermesh and one overlay of it. */
+#include "priority.h"
 
 #include <fnmatch.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The cells of one class: of the file, or pieces of them. */
-typedef struct part {
-  remap_mesh     mesh;
-  remap_context *maker;       /* of pieces: what holds the arrays; NULL: they are owned here */
-  int64_t       *cell_global; /* owned, as are these */
-  int64_t       *face_offset, *face_node, *face_owner, *face_neighbour;
-  int64_t       *place; /* cells of the file: [cells] place in arrays of fields as they were read */
-  uint8_t       *gives; /* [cells] the mask, NULL if there is none */
-} part;
-
-struct cli_cut {
-  int              num_classes, num_parts;
-  part            *part;         /* [num_parts], room for [num_classes] */
-  remap_mesh      *block;        /* [num_parts], likewise */
-  double         **values;       /* [num_parts] [fields][cells], while they are made */
-  int64_t         *first_global; /* [num_parts + 1] cells of part k are numbered from there on; of the first as in the file */
-  double          *in;           /* [fields][num_cells] */
-  int64_t          num_cells;
-  int64_t         *cell_global; /* [num_cells] */
-  const char     **zone_name;
-  int64_t         *zone_cell_offset;
-  rcgns_zone_info *zone;
-  rcgns_info       info; /* the file's, and one more zone for the pieces */
-};
-
-static int num_carried(const cli_job *j) { return j->num_fields + j->num_hidden; }
+int cli_num_carried(const cli_job *j) { return j->num_fields + j->num_hidden; }
 
 /* ---- classes ------------------------------------------------------------------------------------------------------ */
 
@@ -94,7 +70,7 @@ cli_exit cli_priority_check(const cli_job *j, cli_failure *why)
 
 /* ---- cells of the file -------------------------------------------------------------------------------------------- */
 
-static bool make_part_room(part *p, int64_t cells, int64_t faces, int64_t corners)
+static bool make_part_room(cli_part *p, int64_t cells, int64_t faces, int64_t corners)
 {
   p->cell_global    = malloc(((size_t)cells + 1) * sizeof(int64_t));
   p->place          = malloc(((size_t)cells + 1) * sizeof(int64_t));
@@ -106,7 +82,7 @@ static bool make_part_room(part *p, int64_t cells, int64_t faces, int64_t corner
 }
 
 /* The cells of a mesh whose class is k; nodes are shared with it. number has room for [cells]. */
-static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int64_t *number, part *p)
+static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int64_t *number, cli_part *p)
 {
   int64_t cells = 0, faces = 0, corners = 0;
 
@@ -127,6 +103,7 @@ static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int
     p->face_neighbour[faces] = m->face_neighbour[f] < 0 ? -1 : number[m->face_neighbour[f]]; /* of one zone, hence one class */
     p->face_offset[++faces]  = corners;
   }
+  p->num_whole           = cells;
   p->mesh                = *m;
   p->mesh.num_cells      = cells;
   p->mesh.num_faces      = faces;
@@ -138,175 +115,103 @@ static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int
   return true;
 }
 
-static void drop_part(part *p)
+/* What else the options ask about cells of the file: their mask, volumes, numbers and boundaries. The faces are those of
+ * take_cells, in its order. */
+static bool take_belongings(const cli_job *j, const rcgns_boundaries *from, const int64_t *number, cli_part *p)
 {
-  remap_destroy(&p->maker);
-  free(p->cell_global);
-  free(p->place);
-  free(p->face_offset);
-  free(p->face_node);
-  free(p->face_owner);
-  free(p->face_neighbour);
-  free(p->gives);
+  const remap_mesh *m      = rcgns_mesh(j->file[REMAP_SOURCE]);
+  const uint8_t    *mask   = j->mask[REMAP_SOURCE];
+  const double     *volume = j->volume[REMAP_SOURCE];
+  const size_t      cells = (size_t)p->mesh.num_cells, faces = (size_t)p->mesh.num_faces;
+  const bool        is_super = j->options.supermesh != NULL;
+
+  if (mask && !(p->gives = malloc(cells + 1))) return false;
+  if (volume && !(p->volume = malloc((cells + 1) * sizeof *p->volume))) return false;
+  if (is_super && !(p->origin = malloc((cells + 1) * sizeof *p->origin))) return false;
+  if (is_super && !(p->boundary = malloc((faces + 1) * sizeof *p->boundary))) return false;
+  for (size_t c = 0; c < cells; c++) {
+    if (mask) p->gives[c] = mask[p->place[c]];
+    if (volume) p->volume[c] = volume[p->place[c]];
+    if (is_super) p->origin[c] = (double)p->cell_global[c];
+  }
+  for (int64_t f = 0, to = 0; is_super && f < m->num_faces; f++)
+    if (number[m->face_owner[f]] >= 0) p->boundary[to++] = from->face ? from->face[f] : -1;
+  return true;
 }
 
 /* ---- pieces ------------------------------------------------------------------------------------------------------- */
 
-static cli_exit from_cut(const cli_job *j, remap_context *ctx, remap_status status, cli_failure *why)
-{
-  if (status == REMAP_OK) return CLI_DONE;
-  return cli_fail(why, status == REMAP_BAD_MESH || status == REMAP_INCONSISTENT ? CLI_GEOMETRY : CLI_INTERNAL,
-                  "%s: its zones cannot be cut by --priority: %s", j->options.path[REMAP_SOURCE],
-                  *remap_message(ctx) ? remap_message(ctx) : remap_status_text(status));
-}
-
-/* A context for steps of the cut. Collective. */
-static cli_exit new_context(cli_job *j, remap_context **out, cli_failure *why)
-{
-  remap_options options;
-  remap_status  status;
-
-  remap_options_default(&options);
-  options.faces     = j->options.faces;
-  options.max_order = j->options.transfer.order;
-  for (int k = 0; k < num_carried(j); k++) options.systems |= j->field[k].system;
-  status = remap_create(j->comm, &options, out);
-  return status == REMAP_OK ? CLI_DONE
-                            : cli_fail(why, CLI_INTERNAL, "%s: %s", j->options.path[REMAP_SOURCE], remap_status_text(status));
-}
-
-/* The mask of pieces is that of the cells they are parts of. Collective. */
-static cli_exit cut_mask(cli_job *j, const part *whole, part *piece, cli_failure *why)
-{
-  const size_t n = (size_t)whole->mesh.num_cells, m = (size_t)piece->mesh.num_cells;
-  double      *in = NULL, *out = NULL;
-  cli_exit     mine;
-
-  if (!j->options.mask[REMAP_SOURCE]) return CLI_DONE;
-  in           = malloc((n + 1) * sizeof *in);
-  out          = malloc((m + 1) * sizeof *out);
-  piece->gives = malloc(m + 1);
-  mine         = cli_agree(j, in && out && piece->gives ? CLI_DONE : cli_no_memory(why), why);
-  if (mine == CLI_DONE) {
-    for (size_t c = 0; c < n; c++) in[c] = whole->gives[c];
-    mine = from_cut(j, piece->maker, remap_supermesh_cell_values(piece->maker, REMAP_SOURCE, in, 0, out), why);
-  }
-  for (size_t c = 0; c < m && mine == CLI_DONE; c++) piece->gives[c] = out[c] != 0;
-  free(in);
-  free(out);
-  return mine;
-}
-
 /* The cells less what is visible of the classes above, whose blocks are given. Collective. */
-static cli_exit cut_cells(cli_job *j, const part *whole, int num_above, const remap_mesh *above, int64_t first_global,
-                          part *piece, int64_t *num_global, cli_failure *why)
+static cli_exit cut_cells(cli_job *j, const cli_part *whole, int num_above, const remap_mesh *above, int64_t first_global,
+                          cli_part *piece, cli_failure *why)
 {
-  remap_supermesh_options options;
-  remap_supermesh_view    view;
-  cli_exit                mine;
+  const remap_supermesh_view *view = &piece->view;
+  remap_supermesh_options     options;
 
-  CLI_TRY(new_context(j, &piece->maker, why));
+  CLI_TRY(cli_cut_context(j, &piece->maker, why));
   remap_set_mesh(piece->maker, REMAP_SOURCE, &whole->mesh);
   remap_set_blocks(piece->maker, REMAP_TARGET, num_above, above);
   remap_supermesh_options_default(&options);
   options.keep = REMAP_IN_SOURCE;
-  CLI_TRY(from_cut(j, piece->maker, remap_supermesh(piece->maker, &options, &view), why));
-  piece->cell_global = malloc(((size_t)view.num_cells + 1) * sizeof(int64_t));
-  mine               = cli_agree(j, piece->cell_global ? CLI_DONE : cli_no_memory(why), why);
-  CLI_TRY(mine);
-  for (int64_t c = 0; c < view.num_cells; c++) piece->cell_global[c] = first_global + view.cell_global[c];
-  *num_global = view.global_cells;
-  piece->mesh = (remap_mesh){.num_nodes        = view.num_nodes,
-                             .num_faces        = view.num_faces,
-                             .num_cells        = view.num_cells,
-                             .node_xyz         = view.node_xyz,
-                             .face_offset      = view.face_offset,
-                             .face_node32      = view.face_node,
-                             .face_owner32     = view.face_owner,
-                             .face_neighbour32 = view.face_neighbour,
+  CLI_TRY(cli_from_cut(j, piece->maker, remap_supermesh(piece->maker, &options, &piece->view), why));
+  piece->cell_global = malloc(((size_t)view->num_cells + 1) * sizeof(int64_t));
+  CLI_TRY(cli_agree(j, piece->cell_global ? CLI_DONE : cli_no_memory(why), why));
+  for (int64_t c = 0; c < view->num_cells; c++) piece->cell_global[c] = first_global + view->cell_global[c];
+  piece->mesh = (remap_mesh){.num_nodes        = view->num_nodes,
+                             .num_faces        = view->num_faces,
+                             .num_cells        = view->num_cells,
+                             .node_xyz         = view->node_xyz,
+                             .face_offset      = view->face_offset,
+                             .face_node32      = view->face_node,
+                             .face_owner32     = view->face_owner,
+                             .face_neighbour32 = view->face_neighbour,
                              .cell_global      = piece->cell_global,
                              .name             = whole->mesh.name};
-  return cut_mask(j, whole, piece, why);
-}
-
-/* ---- values ------------------------------------------------------------------------------------------------------- */
-
-/* All fields from whole cells to their pieces; in and out are [fields][cells] of them. Collective. */
-static cli_exit carry(cli_job *j, const part *whole, const part *piece, const double *in, double *out, cli_failure *why)
-{
-  const remap_masks masks = {.gives = {whole->gives, NULL}, .wants = {NULL, piece->gives}};
-  remap_transfer    how   = j->options.transfer;
-  remap_field_desc *f     = malloc(((size_t)num_carried(j) + 1) * sizeof *f);
-  remap_context    *ctx   = NULL;
-  cli_exit          mine  = cli_agree(j, f ? CLI_DONE : cli_no_memory(why), why);
-
-  if (mine == CLI_DONE) mine = new_context(j, &ctx, why);
-  if (mine == CLI_DONE) {
-    remap_set_mesh(ctx, REMAP_SOURCE, &whole->mesh);
-    remap_set_mesh(ctx, REMAP_TARGET, &piece->mesh);
-    mine = from_cut(j, ctx, remap_build(ctx), why);
-  }
-  if (mine == CLI_DONE && j->options.mask[REMAP_SOURCE]) mine = from_cut(j, ctx, remap_set_masks(ctx, &masks), why);
-  if (mine == CLI_DONE) {
-    for (int k = 0; k < num_carried(j); k++) {
-      f[k]         = j->field[k];
-      f[k].in      = in + (int64_t)k * whole->mesh.num_cells;
-      f[k].out     = out + (int64_t)k * piece->mesh.num_cells;
-      f[k].has_old = 0;
-    }
-    how.on_uncovered = REMAP_UNCOVERED_KEEP; /* by rounding at most */
-    how.on_partial   = REMAP_PARTIAL_NORMALISE;
-    how.rotation     = NULL; /* once is enough */
-    how.allow_nan    = j->options.allow_nan;
-    mine             = from_cut(j, ctx, remap_field(ctx, REMAP_FORWARD, &how, num_carried(j), f, NULL), why);
-  }
-  remap_destroy(&ctx);
-  free(f);
-  return mine;
+  return CLI_DONE;
 }
 
 /* The values of a class as they were read, [fields][cells]; NULL: no memory. */
-static double *take_values(const cli_job *j, const part *p)
+static double *take_values(const cli_job *j, const cli_part *p)
 {
   const int64_t n   = p->mesh.num_cells;
-  double       *all = malloc(((size_t)(n * num_carried(j)) + 1) * sizeof *all);
+  double       *all = malloc(((size_t)(n * cli_num_carried(j)) + 1) * sizeof *all);
 
-  for (int k = 0; all && k < num_carried(j); k++)
+  for (int k = 0; all && k < cli_num_carried(j); k++)
     for (int64_t c = 0; c < n; c++) all[k * n + c] = j->field[k].in[p->place[c]];
   return all;
 }
 
 /* ---- the whole ---------------------------------------------------------------------------------------------------- */
 
-/* One class into the next part: its cells, cut unless it is the first, and their values. Collective. */
+/* One class into the next part: its cells, cut unless it is the first, and what belongs to them. Collective. */
 static cli_exit add_class(cli_job *j, cli_cut *cut, const int *class_of_cell, int k, int64_t *number, cli_failure *why)
 {
   const remap_mesh *m     = rcgns_mesh(j->file[REMAP_SOURCE]);
-  const uint8_t    *mask  = j->mask[REMAP_SOURCE];
   const int         p     = cut->num_parts;
-  part              whole = {.maker = NULL}, *to = &cut->part[p];
-  bool              ok  = take_cells(m, class_of_cell, k, number, &whole);
-  double           *in  = ok ? take_values(j, &whole) : NULL;
-  int64_t           num = 0;
+  cli_part          whole = {.maker = NULL}, *to = &cut->part[p];
+  bool              ok = take_cells(m, class_of_cell, k, number, &whole);
+  double           *in = ok ? take_values(j, &whole) : NULL;
   cli_exit          mine;
 
-  if (ok && mask) whole.gives = malloc((size_t)whole.mesh.num_cells + 1);
-  for (int64_t c = 0; ok && whole.gives && c < whole.mesh.num_cells; c++) whole.gives[c] = mask[whole.place[c]];
-  mine = cli_agree(j, in && (!mask || whole.gives) ? CLI_DONE : cli_no_memory(why), why);
+  ok   = in && take_belongings(j, &cut->boundaries, number, &whole);
+  mine = cli_agree(j, ok ? CLI_DONE : cli_no_memory(why), why);
   cut->num_parts++;
   if (p == 0) {
     *to            = whole;
     cut->values[0] = in;
     return mine;
   }
-  if (mine == CLI_DONE) mine = cut_cells(j, &whole, p, cut->block, cut->first_global[p], to, &num, why);
-  cut->first_global[p + 1] = cut->first_global[p] + num;
+  if (mine == CLI_DONE) mine = cut_cells(j, &whole, p, cut->block, cut->first_global[p], to, why);
+  cut->first_global[p + 1] = cut->first_global[p] + to->view.global_cells;
   if (mine == CLI_DONE) {
-    cut->values[p] = malloc(((size_t)(to->mesh.num_cells * num_carried(j)) + 1) * sizeof(double));
+    cut->values[p] = malloc(((size_t)(to->mesh.num_cells * cli_num_carried(j)) + 1) * sizeof(double));
     mine           = cli_agree(j, cut->values[p] ? CLI_DONE : cli_no_memory(why), why);
   }
-  if (mine == CLI_DONE) mine = carry(j, &whole, to, in, cut->values[p], why);
-  drop_part(&whole);
+  if (mine == CLI_DONE) mine = cli_pieces_fill(j, &whole, to, in, cut->values[p], why);
+  to->num_whole = whole.num_whole;
+  to->place     = whole.place;
+  whole.place   = NULL;
+  cli_part_drop(&whole);
   free(in);
   return mine;
 }
@@ -340,85 +245,91 @@ static cli_exit add_classes(cli_job *j, cli_cut *cut, cli_failure *why)
   return mine;
 }
 
-/* The parts one behind the other: cells, values, mask. */
+/* The parts one behind the other: cells, values, mask, volumes, boundaries. */
 static bool join_parts(cli_job *j, cli_cut *cut)
 {
-  int64_t  at    = 0;
-  uint8_t *gives = NULL;
+  int64_t  at = 0, face = 0;
+  uint8_t *gives  = NULL;
+  double  *volume = NULL;
 
-  for (int p = 0; p < cut->num_parts; p++) cut->num_cells += cut->part[p].mesh.num_cells;
-  cut->in          = malloc(((size_t)(cut->num_cells * num_carried(j)) + 1) * sizeof *cut->in);
+  for (int p = 0; p < cut->num_parts; p++) {
+    cut->num_cells += cut->part[p].mesh.num_cells;
+    cut->num_faces += cut->part[p].mesh.num_faces;
+  }
+  cut->in          = malloc(((size_t)(cut->num_cells * cli_num_carried(j)) + 1) * sizeof *cut->in);
   cut->cell_global = malloc(((size_t)cut->num_cells + 1) * sizeof *cut->cell_global);
-  if (j->mask[REMAP_SOURCE]) gives = malloc((size_t)cut->num_cells + 1);
-  if (!cut->in || !cut->cell_global || (j->mask[REMAP_SOURCE] && !gives)) {
-    free(gives);
-    return false;
-  }
-  for (int p = 0; p < cut->num_parts; at += cut->part[p++].mesh.num_cells) {
-    const size_t n = (size_t)cut->part[p].mesh.num_cells;
-
-    memcpy(cut->cell_global + at, cut->part[p].cell_global, n * sizeof(int64_t));
-    if (gives) memcpy(gives + at, cut->part[p].gives, n);
-    for (int k = 0; k < num_carried(j); k++)
-      memcpy(cut->in + k * cut->num_cells + at, cut->values[p] + (size_t)k * n, n * sizeof(double));
-  }
-  for (int k = 0; k < num_carried(j); k++) j->field[k].in = cut->in + k * cut->num_cells;
-  if (gives) {
+  if (!cut->in || !cut->cell_global) return false;
+  if (j->options.supermesh && !(cut->boundary = malloc(((size_t)cut->num_faces + 1) * sizeof *cut->boundary))) return false;
+  if (j->mask[REMAP_SOURCE]) {
+    if (!(gives = malloc((size_t)cut->num_cells + 1))) return false;
     free(j->mask[REMAP_SOURCE]);
     j->mask[REMAP_SOURCE] = gives;
   }
+  if (j->volume[REMAP_SOURCE]) {
+    if (!(volume = malloc(((size_t)cut->num_cells + 1) * sizeof *volume))) return false;
+    free(j->volume[REMAP_SOURCE]);
+    j->volume[REMAP_SOURCE] = volume;
+  }
+  for (int p = 0; p < cut->num_parts; p++) {
+    const cli_part *part = &cut->part[p];
+    const size_t    n = (size_t)part->mesh.num_cells, faces = (size_t)part->mesh.num_faces;
+
+    memcpy(cut->cell_global + at, part->cell_global, n * sizeof(int64_t));
+    if (gives) memcpy(gives + at, part->gives, n);
+    if (volume) memcpy(volume + at, part->volume, n * sizeof *volume);
+    if (volume) cut->block[p].cell_volume = volume + at;
+    if (cut->boundary) memcpy(cut->boundary + face, part->boundary, faces * sizeof *cut->boundary);
+    for (int k = 0; k < cli_num_carried(j); k++)
+      memcpy(cut->in + k * cut->num_cells + at, cut->values[p] + (size_t)k * n, n * sizeof(double));
+    at += part->mesh.num_cells;
+    face += part->mesh.num_faces;
+  }
+  cut->boundaries.face = cut->boundary;
+  for (int k = 0; k < cli_num_carried(j); k++) j->field[k].in = cut->in + k * cut->num_cells;
   return true;
 }
 
-/* The zones of the file and one for the pieces, for messages and the report. */
+/* The zones of the file and one for the pieces of each class, for messages, the report and the joining of zones. */
 static bool name_zones(cli_job *j, cli_cut *cut)
 {
   const rcgns_info *info = rcgns_get_info(j->file[REMAP_SOURCE]);
-  const size_t      n    = (size_t)info->num_zones;
-  const int64_t     last = cut->first_global[cut->num_parts];
+  const size_t      n = (size_t)info->num_zones, all = n + (size_t)cut->num_parts - 1;
 
-  cut->zone             = malloc((n + 1) * sizeof *cut->zone);
-  cut->zone_name        = malloc((n + 1) * sizeof *cut->zone_name);
-  cut->zone_cell_offset = malloc((n + 2) * sizeof *cut->zone_cell_offset);
-  if (!cut->zone || !cut->zone_name || !cut->zone_cell_offset) return false;
+  cut->zone             = malloc((all + 1) * sizeof *cut->zone);
+  cut->zone_name        = malloc((all + 1) * sizeof *cut->zone_name);
+  cut->zone_cell_offset = malloc((all + 2) * sizeof *cut->zone_cell_offset);
+  cut->piece_name       = malloc((size_t)cut->num_parts * sizeof *cut->piece_name);
+  if (!cut->zone || !cut->zone_name || !cut->zone_cell_offset || !cut->piece_name) return false;
   memcpy(cut->zone, info->zone, n * sizeof *cut->zone);
-  cut->zone[n] = (rcgns_zone_info){
-      .name = "(pieces of zones of lower priority)", .num_cells = last - info->num_cells, .first_cell = info->num_cells};
-  for (size_t z = 0; z <= n; z++) {
+  for (int p = 1; p < cut->num_parts; p++) {
+    const int64_t first = cut->first_global[p];
+
+    snprintf(cut->piece_name[p], sizeof *cut->piece_name, "(pieces of zones of priority %d)", p + 1);
+    cut->zone[n + (size_t)p - 1] =
+        (rcgns_zone_info){.name = cut->piece_name[p], .num_cells = cut->first_global[p + 1] - first, .first_cell = first};
+  }
+  for (size_t z = 0; z < all; z++) {
     cut->zone_name[z]        = cut->zone[z].name;
     cut->zone_cell_offset[z] = cut->zone[z].first_cell;
   }
-  cut->zone_cell_offset[n + 1]   = last;
+  cut->zone_cell_offset[all]     = cut->first_global[cut->num_parts];
   cut->info                      = *info;
   cut->info.zone                 = cut->zone;
-  cut->info.num_zones            = info->num_zones + 1;
+  cut->info.num_zones            = (int64_t)all;
   cut->block[0].num_zones        = cut->info.num_zones;
   cut->block[0].zone_name        = cut->zone_name;
   cut->block[0].zone_cell_offset = cut->zone_cell_offset;
   return true;
 }
 
-static cli_exit refuse_others(const cli_job *j, cli_failure *why)
-{
-  const char *other = j->options.check                  ? "--check"
-                      : j->options.source_coverage      ? "--source-coverage"
-                      : j->options.volume[REMAP_SOURCE] ? "--source-volume"
-                      : j->options.supermesh            ? "--supermesh"
-                                                        : NULL;
-
-  return other
-             ? cli_fail(why, CLI_USAGE, "%s knows no pieces of cells: leave it or the zones of SOURCE in --priority out", other)
-             : CLI_DONE;
-}
-
 cli_exit cli_priority_cut(cli_job *j, cli_failure *why)
 {
-  cli_cut *cut;
-  size_t   n;
-  cli_exit mine;
+  rcgns_message message;
+  cli_cut      *cut;
+  size_t        n;
+  cli_exit      mine;
 
   if (!cli_has_priority(j, REMAP_SOURCE)) return CLI_DONE;
-  CLI_TRY(refuse_others(j, why));
   cli_progress_set(j->progress, "cutting zones", -1);
   n   = (size_t)class_of(j->options.priority, "") + 1;
   cut = j->cut = calloc(1, sizeof *cut);
@@ -431,6 +342,8 @@ cli_exit cli_priority_cut(cli_job *j, cli_failure *why)
   }
   mine = cut && cut->part && cut->block && cut->values && cut->first_global ? CLI_DONE : cli_no_memory(why);
   CLI_TRY(cli_agree(j, mine, why));
+  if (j->options.supermesh)
+    CLI_TRY(cli_from_cgns(rcgns_read_boundaries(j->file[REMAP_SOURCE], &cut->boundaries, &message), &message, why));
   CLI_TRY(add_classes(j, cut, why));
   CLI_TRY(cli_agree(j, join_parts(j, cut) && name_zones(j, cut) ? CLI_DONE : cli_no_memory(why), why));
   j->report.info[REMAP_SOURCE] = &cut->info;
@@ -446,7 +359,7 @@ void cli_cut_drop(cli_cut **address)
   *address = NULL;
   if (!cut) return;
   for (int p = 0; p < cut->num_parts; p++) {
-    drop_part(&cut->part[p]);
+    cli_part_drop(&cut->part[p]);
     free(cut->values[p]);
   }
   free(cut->part);
@@ -458,6 +371,8 @@ void cli_cut_drop(cli_cut **address)
   free(cut->zone);
   free(cut->zone_name);
   free(cut->zone_cell_offset);
+  free(cut->piece_name);
+  free(cut->boundary);
   free(cut);
 }
 
@@ -471,6 +386,14 @@ int64_t cli_num_cells(const cli_job *j, remap_side side)
 const int64_t *cli_cells(const cli_job *j, remap_side side)
 {
   return j->cut && side == REMAP_SOURCE ? j->cut->cell_global : rcgns_mesh(j->file[side])->cell_global;
+}
+
+const remap_mesh *cli_blocks(const cli_job *j, remap_side side, int *num_blocks)
+{
+  const bool is_cut = j->cut && side == REMAP_SOURCE;
+
+  *num_blocks = is_cut ? j->cut->num_parts : 1;
+  return is_cut ? j->cut->block : rcgns_mesh(j->file[side]);
 }
 
 void cli_set_mesh(const cli_job *j, remap_context *ctx, remap_side side)

@@ -2,7 +2,7 @@
  * Made after the overlay, which stays as it is; as large as the pairs. */
 #include "job.h"
 
-#include <string.h>
+#include <stdlib.h>
 #include <vtk.h>
 
 #define CGNS_VERSION 4.2 /* what most readers of ElementStartOffset want */
@@ -24,22 +24,39 @@ static cli_exit write_file(cli_job *j, const rslice_content *content, cli_failur
 static cli_exit take_boundaries(cli_job *j, cli_boundaries *to, int64_t num_faces, cli_failure *why)
 {
   rcgns_boundaries from[2];
-  rcgns_message    message;
+  int64_t          num[2];
 
-  for (int side = 0; side < 2; side++)
-    CLI_TRY(cli_from_cgns(rcgns_read_boundaries(j->file[side], &from[side], &message), &message, why));
+  for (int side = 0; side < 2; side++) CLI_TRY(cli_side_boundaries(j, (remap_side)side, &from[side], &num[side], why));
   CLI_TRY(cli_boundaries_begin(j->comm, num_faces, from[0].num + from[1].num, to, why));
   for (int side = 0; side < 2; side++)
-    CLI_TRY(cli_boundaries_take(j->comm, j->ctx, (remap_side)side, rcgns_mesh(j->file[side]), &from[side], to, why));
+    CLI_TRY(cli_boundaries_take(j->comm, j->ctx, (remap_side)side, num[side], &from[side], to, why));
   return CLI_DONE;
+}
+
+/* The supermesh with ancestors and boundaries as they are numbered in the files. Collective. */
+static cli_exit write_supermesh(cli_job *j, remap_supermesh_view *view, int64_t *ancestor, cli_failure *why)
+{
+  rslice_content content = {.mesh = view, .ancestor = {"AncestorSource", "AncestorTarget"}};
+  cli_boundaries b       = {.num = 0};
+  cli_exit       code;
+
+  CLI_TRY(cli_source_ancestors(j, view, ancestor, why));
+  view->cell_ancestor[REMAP_SOURCE] = ancestor;
+  code                              = take_boundaries(j, &b, view->num_faces, why);
+  content.num_boundaries            = b.num;
+  content.boundary_name             = b.name;
+  content.boundary_type             = b.type;
+  content.face_boundary             = b.face;
+  if (code == CLI_DONE) code = write_file(j, &content, why);
+  cli_boundaries_drop(&b);
+  return code;
 }
 
 cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
 {
+  cli_supermesh_row   *row = &j->report.supermesh;
   remap_supermesh_view view;
-  cli_boundaries       b       = {.num = 0};
-  rslice_content       content = {.mesh = &view, .ancestor = {"AncestorSource", "AncestorTarget"}};
-  cli_supermesh_row   *row     = &j->report.supermesh;
+  int64_t             *ancestor;
   cli_exit             code;
 
   cli_progress_set(j->progress, "supermesh", -1);
@@ -52,13 +69,10 @@ cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
   row->volume = 0;
   for (int64_t c = 0; c < view.num_cells; c++) row->volume += view.cell_volume[c];
   MPI_Allreduce(MPI_IN_PLACE, &row->volume, 1, MPI_DOUBLE, MPI_SUM, j->comm);
-  code                   = take_boundaries(j, &b, view.num_faces, why);
-  content.num_boundaries = b.num;
-  content.boundary_name  = b.name;
-  content.boundary_type  = b.type;
-  content.face_boundary  = b.face;
-  if (code == CLI_DONE) code = write_file(j, &content, why);
-  cli_boundaries_drop(&b);
+  ancestor = malloc(((size_t)view.num_cells + 1) * sizeof *ancestor);
+  code     = cli_agree(j, ancestor ? CLI_DONE : cli_no_memory(why), why);
+  if (code == CLI_DONE) code = write_supermesh(j, &view, ancestor, why);
+  free(ancestor);
   if (code == CLI_DONE) row->path = j->options.supermesh;
   return code;
 }
