@@ -85,20 +85,17 @@ static void add_tetrahedron(const known *k, const double *apex, const double *a,
   sum[2] += volume;
 }
 
-/* An entry of an array that is there with 64 or with 32 bits. */
-static int64_t entry(const int64_t *wide, const int32_t *narrow, int64_t i) { return wide ? wide[i] : narrow[i]; }
-
 /* Corner i of a face that begins at entry `first` of the loops. */
 static const double *corner(const remap_mesh *m, int64_t first, int64_t i)
 {
-  return m->node_xyz + 3 * entry(m->face_node, m->face_node32, first + i);
+  return m->node_xyz + 3 * cli_entry(m->face_node, m->face_node32, first + i);
 }
 
 /* Add a face to the integrals of a cell; sign -1 if its normal points into it. */
 static void add_face(const known *k, const remap_mesh *m, int64_t face, const double *apex, double sign, double sum[3])
 {
-  const int64_t first     = entry(m->face_offset, m->face_offset32, face);
-  const int64_t n         = entry(m->face_offset, m->face_offset32, face + 1) - first;
+  const int64_t first     = cli_entry(m->face_offset, m->face_offset32, face);
+  const int64_t n         = cli_entry(m->face_offset, m->face_offset32, face + 1) - first;
   double        middle[3] = {0, 0, 0}, part[3] = {0, 0, 0};
 
   for (int64_t i = 0; i < n; i++)
@@ -118,8 +115,8 @@ static void find_means(const known *k, check_side *s, double *sum)
     const remap_mesh *m = &s->block[b];
 
     for (int64_t f = 0; f < m->num_faces; f++) {
-      const int64_t own   = first + entry(m->face_owner, m->face_owner32, f);
-      const int64_t other = entry(m->face_neighbour, m->face_neighbour32, f);
+      const int64_t own   = first + cli_entry(m->face_owner, m->face_owner32, f);
+      const int64_t other = cli_entry(m->face_neighbour, m->face_neighbour32, f);
 
       add_face(k, m, f, s->centre + 3 * own, 1, sum + 3 * own);
       if (other >= 0) add_face(k, m, f, s->centre + 3 * (first + other), -1, sum + 3 * (first + other));

@@ -113,6 +113,9 @@ int64_t cli_num_cells(const cli_job *j, remap_side side);
 /** Their global numbers, [cli_num_cells]. Owned by the job. Not collective. */
 const int64_t *cli_cells(const cli_job *j, remap_side side);
 
+/** An entry of an array of a mesh, which is there with 64 or with 32 bits. Not collective. */
+static inline int64_t cli_entry(const int64_t *wide, const int32_t *narrow, int64_t i) { return wide ? wide[i] : narrow[i]; }
+
 /** The meshes that are lent, one block after the other. Owned by the job. Not collective. */
 const remap_mesh *cli_blocks(const cli_job *j, remap_side side, int *num_blocks);
 

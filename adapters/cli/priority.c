@@ -70,53 +70,24 @@ cli_exit cli_priority_check(const cli_job *j, cli_failure *why)
 
 /* ---- cells of the file -------------------------------------------------------------------------------------------- */
 
-static bool make_part_room(cli_part *p, int64_t cells, int64_t faces, int64_t corners)
-{
-  p->cell_global    = malloc(((size_t)cells + 1) * sizeof(int64_t));
-  p->place          = malloc(((size_t)cells + 1) * sizeof(int64_t));
-  p->face_offset    = malloc(((size_t)faces + 1) * sizeof(int64_t));
-  p->face_node      = malloc(((size_t)corners + 1) * sizeof(int64_t));
-  p->face_owner     = malloc(((size_t)faces + 1) * sizeof(int64_t));
-  p->face_neighbour = malloc(((size_t)faces + 1) * sizeof(int64_t));
-  return p->cell_global && p->place && p->face_offset && p->face_node && p->face_owner && p->face_neighbour;
-}
-
 /* The cells of a mesh whose class is k; nodes are shared with it. number has room for [cells]. */
 static bool take_cells(const remap_mesh *m, const int *class_of_cell, int k, int64_t *number, cli_part *p)
 {
-  int64_t cells = 0, faces = 0, corners = 0;
+  int64_t cells = 0;
 
   for (int64_t c = 0; c < m->num_cells; c++) number[c] = class_of_cell[c] == k ? cells++ : -1;
-  for (int64_t f = 0; f < m->num_faces; f++)
-    if (number[m->face_owner[f]] >= 0) faces++, corners += m->face_offset[f + 1] - m->face_offset[f];
-  if (!make_part_room(p, cells, faces, corners)) return false;
+  p->num_whole   = cells;
+  p->cell_global = malloc(((size_t)cells + 1) * sizeof *p->cell_global);
+  p->place       = malloc(((size_t)cells + 1) * sizeof *p->place);
+  if (!p->cell_global || !p->place || !cli_part_take(m, number, cells, p)) return false;
   for (int64_t c = 0; c < m->num_cells; c++)
     if (number[c] >= 0) p->cell_global[number[c]] = m->cell_global[c], p->place[number[c]] = c;
-  faces = corners = p->face_offset[0] = 0;
-  for (int64_t f = 0; f < m->num_faces; f++) {
-    const int64_t n = m->face_offset[f + 1] - m->face_offset[f];
-
-    if (number[m->face_owner[f]] < 0) continue;
-    memcpy(p->face_node + corners, m->face_node + m->face_offset[f], (size_t)n * sizeof(int64_t));
-    corners += n;
-    p->face_owner[faces]     = number[m->face_owner[f]];
-    p->face_neighbour[faces] = m->face_neighbour[f] < 0 ? -1 : number[m->face_neighbour[f]]; /* of one zone, hence one class */
-    p->face_offset[++faces]  = corners;
-  }
-  p->num_whole           = cells;
-  p->mesh                = *m;
-  p->mesh.num_cells      = cells;
-  p->mesh.num_faces      = faces;
-  p->mesh.cell_global    = p->cell_global;
-  p->mesh.face_offset    = p->face_offset;
-  p->mesh.face_node      = p->face_node;
-  p->mesh.face_owner     = p->face_owner;
-  p->mesh.face_neighbour = p->face_neighbour;
+  p->mesh.cell_global = p->cell_global;
   return true;
 }
 
 /* What else the options ask about cells of the file: their mask, volumes, numbers and boundaries. The faces are those of
- * take_cells, in its order. */
+ * cli_part_take, in its order. */
 static bool take_belongings(const cli_job *j, const rcgns_boundaries *from, const int64_t *number, cli_part *p)
 {
   const remap_mesh *m      = rcgns_mesh(j->file[REMAP_SOURCE]);
@@ -135,7 +106,7 @@ static bool take_belongings(const cli_job *j, const rcgns_boundaries *from, cons
     if (is_super) p->origin[c] = (double)p->cell_global[c];
   }
   for (int64_t f = 0, to = 0; is_super && f < m->num_faces; f++)
-    if (number[m->face_owner[f]] >= 0) p->boundary[to++] = from->face ? from->face[f] : -1;
+    if (cli_is_taken(m, number, f)) p->boundary[to++] = from->face ? from->face[f] : -1;
   return true;
 }
 
@@ -302,11 +273,9 @@ static bool name_zones(cli_job *j, cli_cut *cut)
   if (!cut->zone || !cut->zone_name || !cut->zone_cell_offset || !cut->piece_name) return false;
   memcpy(cut->zone, info->zone, n * sizeof *cut->zone);
   for (int p = 1; p < cut->num_parts; p++) {
-    const int64_t first = cut->first_global[p];
-
     snprintf(cut->piece_name[p], sizeof *cut->piece_name, "(pieces of zones of priority %d)", p + 1);
-    cut->zone[n + (size_t)p - 1] =
-        (rcgns_zone_info){.name = cut->piece_name[p], .num_cells = cut->first_global[p + 1] - first, .first_cell = first};
+    cut->zone[n + (size_t)p - 1] = (rcgns_zone_info){
+        .name = cut->piece_name[p], .num_cells = cut->part[p].num_visible, .first_cell = cut->first_global[p]};
   }
   for (size_t z = 0; z < all; z++) {
     cut->zone_name[z]        = cut->zone[z].name;
@@ -325,6 +294,7 @@ static bool name_zones(cli_job *j, cli_cut *cut)
 cli_exit cli_priority_cut(cli_job *j, cli_failure *why)
 {
   rcgns_message message;
+  int64_t       pieces = 0;
   cli_cut      *cut;
   size_t        n;
   cli_exit      mine;
@@ -347,8 +317,8 @@ cli_exit cli_priority_cut(cli_job *j, cli_failure *why)
   CLI_TRY(add_classes(j, cut, why));
   CLI_TRY(cli_agree(j, join_parts(j, cut) && name_zones(j, cut) ? CLI_DONE : cli_no_memory(why), why));
   j->report.info[REMAP_SOURCE] = &cut->info;
-  cli_note(j, "%s: %lld pieces of cells of lower priority are visible", cut->info.path,
-           (long long)(cut->first_global[cut->num_parts] - cut->info.num_cells));
+  for (int p = 1; p < cut->num_parts; p++) pieces += cut->part[p].num_visible;
+  cli_note(j, "%s: %lld pieces of cells of lower priority are visible", cut->info.path, (long long)pieces);
   return CLI_DONE;
 }
 

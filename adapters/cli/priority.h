@@ -12,12 +12,14 @@ typedef struct cli_part {
   remap_context       *transfer;    /**< of pieces: overlay with the cells they are parts of, while it is needed; else NULL */
   int64_t             *cell_global; /**< owned, as are these */
   int64_t             *face_offset, *face_node, *face_owner, *face_neighbour;
-  int64_t              num_whole; /**< cells of the file in this class */
-  int64_t             *place;     /**< [num_whole] their places in arrays of the file's cells */
-  uint8_t             *gives;     /**< [cells] the mask; this and the following are NULL if nobody asked for them */
-  double              *volume;    /**< [cells] the solver's own */
-  double              *origin;    /**< [cells] global numbers in the file, of pieces those of the cells they are parts of */
-  int32_t             *boundary;  /**< [faces] number of the boundary they are on, -1: none */
+  int64_t             *number;      /**< of pieces: [view.num_cells] where they are in mesh, -1: rounding, left out */
+  int64_t              num_visible; /**< of pieces: over all ranks */
+  int64_t              num_whole;   /**< cells of the file in this class */
+  int64_t             *place;       /**< [num_whole] their places in arrays of the file's cells */
+  uint8_t             *gives;       /**< [cells] the mask; this and the following are NULL if nobody asked for them */
+  double              *volume;      /**< [cells] the solver's own */
+  double              *origin;      /**< [cells] global numbers in the file, of pieces those of the cells they are parts of */
+  int32_t             *boundary;    /**< [faces] number of the boundary they are on, -1: none */
 } cli_part;
 
 struct cli_cut {
@@ -47,8 +49,16 @@ cli_exit cli_cut_context(cli_job *j, remap_context **out, cli_failure *why);
 /** A status of the library in a step of the cut. Not collective. */
 cli_exit cli_from_cut(const cli_job *j, remap_context *ctx, remap_status status, cli_failure *why);
 
+/** Is a face of a mesh on a cell that has a number (not -1)? Not collective. */
+bool cli_is_taken(const remap_mesh *mesh, const int64_t *number, int64_t face);
+
+/** The cells of a mesh that have a number, below num_cells and ascending, as the mesh of the part, but for cell_global; nodes
+ *  are shared with it. false: no memory. Not collective. */
+bool cli_part_take(const remap_mesh *mesh, const int64_t *number, int64_t num_cells, cli_part *part);
+
 /** Let pieces have what belongs to the cells they are parts of: mask, volumes, numbers, boundaries; in and out are the values
- *  of all fields, [fields][cells]. Collective. Errors: GEOMETRY, INTERNAL. */
+ *  of all fields, [fields][cells]. Pieces that are no more than rounding of their cells are left out of all. Collective.
+ *  Errors: GEOMETRY, INTERNAL. */
 cli_exit cli_pieces_fill(cli_job *j, const cli_part *whole, cli_part *piece, const double *in, double *out, cli_failure *why);
 
 /** Give a part back. Collective. */

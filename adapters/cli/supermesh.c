@@ -52,6 +52,17 @@ static cli_exit write_supermesh(cli_job *j, remap_supermesh_view *view, int64_t 
   return code;
 }
 
+/* Pieces of cells have rounded nodes, so that they may overlap what they were cut at; then they are no mesh to make one of. */
+static cli_exit from_supermesh(const cli_job *j, remap_status status, cli_failure *why)
+{
+  if (!j->cut || (status != REMAP_BAD_MESH && status != REMAP_ZONE_OVERLAP)) return cli_from_remap(j, status, why);
+  return cli_fail(
+      why, CLI_GEOMETRY,
+      "%s: by rounding, pieces that --priority leaves do not fit the cells they were cut at: leave --supermesh out, or "
+      "the zones of SOURCE in --priority: %s",
+      j->options.path[REMAP_SOURCE], remap_message(j->ctx));
+}
+
 cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
 {
   cli_supermesh_row   *row = &j->report.supermesh;
@@ -60,7 +71,7 @@ cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
   cli_exit             code;
 
   cli_progress_set(j->progress, "supermesh", -1);
-  CLI_TRY(cli_from_remap(j, remap_supermesh(j->ctx, NULL, &view), why));
+  CLI_TRY(from_supermesh(j, remap_supermesh(j->ctx, NULL, &view), why));
   for (int side = 0; side < 2; side++)
     if (view.zone_overlap[side] > 0)
       cli_note(j, "%s: zones overlap by rounding; a volume of %.3g that two of them have counts once in the supermesh",

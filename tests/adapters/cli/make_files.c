@@ -26,6 +26,7 @@ typedef struct recipe {
   bool        masks;       /* a node Masks: Iblank, ChimeraCellType and others; Density is absurd in their holes */
   bool        linear;      /* Tracer is a linear field, by the middles of cells */
   bool        hole_column; /* the holes are the first cells along x of the second zone instead */
+  bool        walls;       /* boundary conditions: Inlet at the low side of x, Outlet of the second zone at its high side */
   bool        bow_tie;     /* one cell that is turned inside out over half of its width: its volume nearly cancels */
   bool        no_coordinates, nan_coordinate, far_node, open_cell, three_cells, short_field, nan_field, at_vertices;
 } recipe;
@@ -61,7 +62,7 @@ static const recipe recipes[] = {
     {.name = "gas_lone", .n = 4, .high = 1, .fields = 1, .gas = GAS | GAS_DENSITY | GAS_LONE},
     {.name = "masked", .n = 4, .high = 1, .fields = 1, .masks = true},
     {.name = "overset", .n = 2, .high = 1, .fields = 1, .masks = true, .second_zone = .5, .hole_column = true},
-    {.name = "crossed", .n = 4, .high = 1, .fields = 1, .linear = true, .second_zone = .3},
+    {.name = "crossed", .n = 4, .high = 1, .fields = 1, .linear = true, .second_zone = .3, .walls = true},
     {.name = "inside", .n = 3, .low = .05, .high = 1.05, .fields = 1, .linear = true},
     {.name = "gas_crossed", .n = 4, .high = 1, .fields = 1, .second_zone = .3, .gas = GAS | GAS_DENSITY | GAS_RATIO},
     {.name = "wide", .n = 4, .low = -1, .high = 2, .fields = 1},
@@ -283,6 +284,20 @@ static void add_masks(double zone, const recipe *r, bool is_second)
   add_1d(node, "Broken", "DataArray_t", "R4", n, broken);
 }
 
+/* A boundary condition by its vertices. */
+static void add_wall(double zone, const recipe *r, bool is_second)
+{
+  const double   list = add(zone, "ZoneBC", "ZoneBC_t", "MT", 0, NULL, NULL);
+  const double   wall = add_text(list, is_second ? "Outlet" : "Inlet", "BC_t", is_second ? "BCOutflow" : "BCInflow");
+  const int      row = r->n + 1, count = row * row;
+  const cgsize_t dims[2] = {1, count};
+  int            node[MAX_NODES];
+
+  for (int i = 0; i < count; i++) node[i] = 1 + row * i + (is_second ? r->n : 0);
+  add_text(wall, "GridLocation", "GridLocation_t", "Vertex");
+  add(wall, "PointList", "IndexArray_t", "I4", 2, dims, node);
+}
+
 static void add_zone(double base, const recipe *r, bool is_second)
 {
   const char    *name = is_second ? "Second" : "Zone";
@@ -306,6 +321,7 @@ static void add_zone(double base, const recipe *r, bool is_second)
     add_solution(zone, r, is_second, "FlowSolution", r->fields);
   if (r->second != 0) add_solution(zone, r, is_second, "Other", r->second);
   if (r->masks) add_masks(zone, r, is_second);
+  if (r->walls) add_wall(zone, r, is_second);
 }
 
 static void write_file(const char *folder, const recipe *r)
