@@ -357,11 +357,12 @@ static void memory_that_runs_out_on_one_rank_fails_on_all(void)
     const boxes_world      *w     = &j.w;
     const rm_transfer_setup setup = boxes_setup(w, REMAP_FORWARD);
     rm_arena               *arena = rm_arena_new();
-    const rm_stencil       *stencil;
+    const rm_stencil       *stencil = NULL;
 
     n++;
     if (rt_rank() == rt_size() - 1) rm_arena_fail_at(arena, n);
     status = rm_stencil_build(arena, &w->comm, &w->frame, w->mesh[0], NULL, &stencil);
+    if (status == REMAP_OK) status = rm_comm_agree(&w->comm, rm_stencil_weigh(arena, w->mesh[0], stencil, &stencil), NULL);
     if (status == REMAP_OK) status = boxes_transfer(arena, &setup, &j.how, 1, &j.field, &j.report, &j.reason);
     if (!rt_all(RT_CHECK(status == REMAP_NO_MEMORY || status == REMAP_OK))) n = 100;
     if (status != REMAP_OK)

@@ -149,6 +149,23 @@ static void cells_that_are_very_many_round_an_edge_have_few_neighbours_that_do(v
   check_bits_of_one_rank(CROWDED, TM_RANDOM);
 }
 
+/* Only what is read travels: of the cells round an edge on other ranks those next to this one's, and a sample. */
+static void halos_hold_neighbours_alone(void)
+{
+  for (int deal = TM_SLABS; deal <= TM_LAST; deal++) {
+    boxes_world w;
+
+    open_mesh(&w, MPI_COMM_WORLD, make(CROWDED), (tm_dealing)deal);
+    const rm_stencil *s    = w.stencil[0];
+    uint8_t          *used = rm_arena_zero(w.arena, s->num_halo, sizeof *used);
+    for (int64_t k = 0; k < s->offset[s->num_cells]; k++)
+      if (s->neighbour[k] >= s->num_cells) used[s->neighbour[k] - s->num_cells] = 1;
+    for (rm_lid h = 0; h < s->num_halo; h++) RT_CHECK(used[h]);
+    if (deal == TM_SLABS) RT_CHECK(s->num_halo < 350); /* of 1500 less the own ones */
+    boxes_close(&w);
+  }
+}
+
 static void inner_cells_of_a_grid_have_26_neighbours_and_8_nodes(void)
 {
   boxes_world w;
@@ -309,6 +326,7 @@ static void slopes_do_not_depend_on_the_unit(void)
 
 RT_MAIN(RT_CASE(slopes_of_linear_fields_are_exact_on_every_kind_of_cell), RT_CASE(stencils_are_those_of_one_rank_bit_by_bit),
         RT_CASE(cells_that_are_very_many_round_an_edge_have_few_neighbours_that_do),
+        RT_CASE(halos_hold_neighbours_alone),
         RT_CASE(inner_cells_of_a_grid_have_26_neighbours_and_8_nodes), RT_CASE(a_mesh_one_cell_thick_has_no_slope_across),
         RT_CASE(a_turned_mesh_one_cell_thick_has_no_slope_across), RT_CASE(a_single_cell_has_slope_zero),
         RT_CASE(thin_cells_reconstruct_linear_fields), RT_CASE(slopes_far_from_the_origin_are_as_good_as_the_coordinates),

@@ -204,6 +204,7 @@ static inline void boxes_open_meshes(boxes_world *world, MPI_Comm comm, tm_mesh 
           REMAP_OK);
     RT_EQ(rm_stencil_build(world->arena, &world->comm, &world->frame, world->mesh[side], NULL, &world->stencil[side]),
           REMAP_OK);
+    RT_EQ(rm_stencil_weigh(world->arena, world->mesh[side], world->stencil[side], &world->stencil[side]), REMAP_OK);
   }
   for (int side = 0; side < 2; side++) tm_free(part[side]);
 }

@@ -145,17 +145,20 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction,
                              .any_uncovered     = mapping->cells_by_cover[receiving][REMAP_UNCOVERED] > 0};
 }
 
-/* Make the stencil that a side needs in a role, unless it is there. Collective. */
-static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_giving)
+/* Make the stencil that a side needs in a role, unless it is there; with weights where fields get slopes. Collective. */
+static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_giving, bool is_weighed)
 {
   const rm_stencil **stencil = stencil_of(ctx, side, is_giving);
   const uint8_t     *mask    = is_giving ? ctx->gives[side] : ctx->wants[side];
 
-  if (*stencil) return REMAP_OK;
   if (!mask && !ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
-  RM_TRY(rm_comm_agree(&ctx->comm, mask || ctx->stencil_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  return rm_stencil_build(mask ? ctx->mask_arena : ctx->stencil_arena[side], &ctx->comm, &ctx->frame, ctx->mesh[side], mask,
-                          stencil);
+  rm_arena *arena = mask ? ctx->mask_arena : ctx->stencil_arena[side];
+  if (!*stencil) {
+    RM_TRY(rm_comm_agree(&ctx->comm, arena ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+    RM_TRY(rm_stencil_build(arena, &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil));
+  }
+  if (!is_weighed || (*stencil)->weight) return REMAP_OK;
+  return rm_comm_agree(&ctx->comm, rm_stencil_weigh(arena, ctx->mesh[side], *stencil, stencil), NULL);
 }
 
 /* Second moments of both sides' cells. Collective. */
@@ -184,28 +187,21 @@ static remap_status need_wide(remap_context *ctx, remap_side side, bool is_givin
                           ctx->second[side], *stencil_of(ctx, side, is_giving), wide);
 }
 
-/* Does a transfer look at what pairs of source cells hold? Forward for integrals over those that are covered in part, and for
- * systems. */
-static bool needs_pairs(const remap_context *ctx, remap_direction direction)
-{
-  return direction == REMAP_BACKWARD || ctx->options.systems || ctx->options.max_order > 2 ||
-         ctx->masked[direction]->cells_by_cover[REMAP_SOURCE][REMAP_PARTIAL] > 0;
-}
-
 /* Make the carrier that a load needs, and what it rests on. Collective. */
 static remap_status prepare(remap_context *ctx, remap_direction direction, rm_load load, rm_reason *reason)
 {
   const remap_side giving = giver_of(direction);
-  remap_status     mine   = needs_pairs(ctx, direction) ? rm_context_need_pairs(ctx) : REMAP_OK;
+  remap_status     mine   = REMAP_OK;
 
   if (ctx->carrier[direction]) load = rm_load_max(load, ctx->load[direction]);
+  if (direction == REMAP_BACKWARD || load.is_curved) mine = rm_context_need_pairs(ctx); /* systems: what slopes add to them */
   rm_arena_drop(ctx->carrier_arena[direction]);
   ctx->carrier[direction]       = NULL;
   ctx->carrier_arena[direction] = rm_arena_new();
   if (!ctx->carrier_arena[direction]) mine = REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(&ctx->comm, mine, NULL));
-  if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true));
-  if (load.has_nearest || load.is_blended) RM_TRY(need_stencil(ctx, 1 - giving, false));
+  if (load.has_slopes) RM_TRY(need_stencil(ctx, giving, true, true));
+  if (load.has_nearest || load.is_blended) RM_TRY(need_stencil(ctx, 1 - giving, false, load.is_blended));
   if (load.is_wide || load.is_curved) RM_TRY(need_second(ctx));
   if (load.is_wide) RM_TRY(need_wide(ctx, giving, true));
   if (load.is_wide && load.is_blended) RM_TRY(need_wide(ctx, 1 - giving, false));

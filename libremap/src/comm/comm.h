@@ -47,6 +47,7 @@ remap_status rm_comm_exchange(const rm_comm *comm, rm_arena *arena, size_t size,
 typedef struct rm_plan {
   int            num_send, num_recv;         /* neighbours, this rank among them if it wants from itself */
   const int     *send_rank, *recv_rank;      /* [num_send], [num_recv] ascending                         */
+  int            own_send, own_recv;         /* place of this rank in both, -1: it is in neither          */
   const int64_t *send_offset, *recv_offset;  /* [num_send + 1], [num_recv + 1]                            */
   const rm_lid  *send_item;                  /* [send_offset[num_send]] which of my items to send         */
   MPI_Request   *request;                    /* [num_send + num_recv] scratch of rm_plan_run              */

@@ -118,12 +118,22 @@ static remap_status keep_neighbours(rm_arena *arena, int num_ranks, const int64_
   return REMAP_OK;
 }
 
+static int place_of(int wanted, int num, const int *rank)
+{
+  int i = 0;
+
+  while (i < num && rank[i] != wanted) i++;
+  return i < num ? i : -1;
+}
+
 /* The plan out of how much is wanted of each rank, and by each. Not collective. */
-static remap_status shorten(rm_arena *arena, int num_ranks, const int64_t *recv_offset, const int64_t *send_offset,
+static remap_status shorten(rm_arena *arena, const rm_comm *comm, const int64_t *recv_offset, const int64_t *send_offset,
                             rm_plan *plan)
 {
-  RM_TRY(keep_neighbours(arena, num_ranks, recv_offset, &plan->num_recv, &plan->recv_rank, &plan->recv_offset));
-  RM_TRY(keep_neighbours(arena, num_ranks, send_offset, &plan->num_send, &plan->send_rank, &plan->send_offset));
+  RM_TRY(keep_neighbours(arena, comm->size, recv_offset, &plan->num_recv, &plan->recv_rank, &plan->recv_offset));
+  RM_TRY(keep_neighbours(arena, comm->size, send_offset, &plan->num_send, &plan->send_rank, &plan->send_offset));
+  plan->own_send = place_of(comm->rank, plan->num_send, plan->send_rank);
+  plan->own_recv = place_of(comm->rank, plan->num_recv, plan->recv_rank);
   RM_NEW(plan->request, arena, (int64_t)plan->num_send + plan->num_recv);
   return REMAP_OK;
 }
@@ -147,7 +157,7 @@ remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_wan
   rm_offsets(recv_offset, comm->size);
   RM_GOTO(done, status = rm_comm_exchange(comm, arena, sizeof *want_item, recv_offset, want_item, send_offset, &asked));
   plan->send_item = asked;
-  status          = shorten(arena, comm->size, recv_offset, send_offset, plan);
+  status          = shorten(arena, comm, recv_offset, send_offset, plan);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   *out = plan;
 done:

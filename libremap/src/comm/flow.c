@@ -21,10 +21,14 @@ static int piece_bytes(int64_t bytes, int64_t done, int64_t chunk)
   return (int)(bytes - done < chunk ? bytes - done : chunk);
 }
 
-/* Where the message of neighbour i starts among those side by side, and the bytes of its items. */
-static int64_t start_of(const int64_t *offset, int i, size_t size)
+/* Where the message to neighbour i starts among those side by side, this rank's own left out; and the bytes of a neighbour's
+ * items. */
+static int64_t start_of(const rm_plan *plan, int i, size_t size)
 {
-  return rm_add_sat(rm_mul_sat(offset[i], (int64_t)size), (int64_t)i * NOTE);
+  const int64_t *offset = plan->send_offset, own = plan->own_send;
+  const int64_t  left_out = own >= 0 && own < i ? offset[own + 1] - offset[own] : 0;
+
+  return rm_add_sat(rm_mul_sat(offset[i] - left_out, (int64_t)size), (int64_t)i * NOTE);
 }
 static int64_t bytes_of(const int64_t *offset, int i, size_t size)
 {
@@ -41,7 +45,7 @@ remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan 
     num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->send_offset, i, most), chunk));
   for (int i = 0; i < plan->num_recv; i++)
     num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->recv_offset, i, most), chunk));
-  RM_NEW(flow.sent, arena, start_of(plan->send_offset, plan->num_send, most));
+  RM_NEW(flow.sent, arena, start_of(plan, plan->num_send, most));
   RM_NEW(flow.arrived, arena, plan->num_recv);
   RM_NEW(flow.received, arena, rm_add_sat(rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most), SPARE));
   RM_NEW(flow.first, arena, plan->num_recv);
@@ -108,7 +112,7 @@ static remap_status expect(const rm_comm *comm, rm_flow *flow, const rm_parley *
 
   flow->first[i] = MPI_REQUEST_NULL;
   flow->rest[i]  = flow->num_requests;
-  if (rank == comm->rank || is_apart(parley, rank)) return REMAP_OK;
+  if (i == flow->plan->own_recv || is_apart(parley, rank)) return REMAP_OK;
   RM_TRY(rm_comm_status(MPI_Irecv(flow->arrived[i], RM_FIRST_BYTES, MPI_BYTE, rank, RM_TAG_FIRST, comm->mpi, &flow->first[i])));
   return post_pieces(comm, flow, false, rank, tag_of(flow, mark), place_of(flow, i),
                      bytes_of(flow->plan->recv_offset, i, flow->size));
@@ -120,7 +124,7 @@ static remap_status send(const rm_comm *comm, rm_flow *flow, const rm_parley *pa
   const rm_plan *plan  = flow->plan;
   const int      rank  = plan->send_rank[i];
   const int64_t  bytes = bytes_of(plan->send_offset, i, flow->size);
-  char          *at    = flow->sent + start_of(plan->send_offset, i, flow->size);
+  char          *at    = flow->sent + start_of(plan, i, flow->size);
 
   if (is_apart(parley, rank)) return REMAP_OK;
   note.tag  = tag_of(flow, note.mark);
@@ -134,14 +138,11 @@ static remap_status send(const rm_comm *comm, rm_flow *flow, const rm_parley *pa
 }
 
 /* Items that this rank wants from itself. */
-static void keep_own(const rm_comm *comm, rm_flow *flow, const char *item)
+static void keep_own(rm_flow *flow, const char *item)
 {
   const rm_plan *plan = flow->plan;
-  int            to = 0, from = 0;
 
-  while (to < plan->num_send && plan->send_rank[to] != comm->rank) to++;
-  while (from < plan->num_recv && plan->recv_rank[from] != comm->rank) from++;
-  if (to < plan->num_send) gather(plan, to, flow->size, item, place_of(flow, from));
+  if (plan->own_send >= 0) gather(plan, plan->own_send, flow->size, item, place_of(flow, plan->own_recv));
 }
 
 remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,
@@ -158,8 +159,8 @@ remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley,
   }
   for (int i = 0; i < plan->num_recv; i++) RM_TRY(expect(comm, flow, parley, i, note.mark));
   for (int i = 0; i < plan->num_send; i++)
-    if (plan->send_rank[i] != comm->rank) RM_TRY(send(comm, flow, parley, i, item, note));
-  keep_own(comm, flow, item);
+    if (i != plan->own_send) RM_TRY(send(comm, flow, parley, i, item, note));
+  keep_own(flow, item);
   return REMAP_OK;
 }
 

@@ -216,7 +216,7 @@ static double factor_of(const rm_admission *w, const rm_transfer_setup *setup, c
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
     double m[3], second[6];
 
-    rm_moments_about(rows, k, setup->giving->cell_centroid[cell], m, second);
+    rm_moments_about(rows, k, rows->volume[k], rows->moment[k], setup->giving->cell_centroid[cell], m, second);
     for (int f = 0; f < num; f++) content[f] = change[f] = 0.0;
     add_content(p, s, place, rows->volume[k], m, second, content, change);
     factor = fmin(factor, rm_admit_factor(p, s, content, change, rows->volume[k], limits, SLACK_GIVE));

@@ -377,7 +377,7 @@ static remap_status report(rm_carrier *c, rm_arena *scratch, remap_field_report 
     widen(c->value + f, n, setup->rows, &least[2 * f + 1], &greatest[2 * f + 1]);
   }
   count_all(c);
-  rm_integral_source(&c->giving, &c->packing, c->integral);
+  rm_integral_source(&c->giving, setup->rows, &c->packing, c->integral);
   RM_TRY(rm_comm_min_f64(setup->comm, least, 2 * n));
   RM_TRY(rm_comm_max_f64(setup->comm, greatest, 2 * n));
   RM_TRY(rm_comm_sum_i64(setup->comm, c->count, NUM_COUNTS * n));

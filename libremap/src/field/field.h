@@ -5,7 +5,7 @@
 
 #include "mapping/mapping.h"
 
-/* stencil -- least squares over vertex neighbours, prepared once per mesh. Neighbours on other ranks are found by the
+/* stencil -- vertex neighbours, prepared once per mesh, and least squares over them. Neighbours on other ranks are found by the
  * coordinates of shared nodes. Read-only once built. Invariants:
  *   a cell's neighbours ascend canonically (centroid's Morton key, centroid, volume, global id), without the cell itself; of
  *   the cells at a node with more than 512 they are about 130, chosen by that order: those next to the cell, others all round;
@@ -15,10 +15,10 @@ typedef struct rm_stencil {
   rm_lid         num_cells;
   const int64_t *offset;      /* [num_cells + 1]                                                       */
   const rm_lid  *neighbour;   /* [offset[num_cells]] < num_cells: own cell; else halo num_cells + k    */
-  const double (*weight)[3];  /* [offset[num_cells]]                                                   */
+  const double (*weight)[3];  /* [offset[num_cells]] NULL until rm_stencil_weigh                       */
   const int64_t *node_offset; /* [num_cells + 1] the cell's nodes, for bounds                          */
   const rm_lid  *node;        /* [node_offset[num_cells]] of the mesh                                  */
-  rm_lid         num_halo;
+  rm_lid         num_halo;     /* cells of other ranks that are neighbours here                         */
   const double (*halo_centroid)[3]; /* [num_halo]                                                            */
   const rm_plan *plan;              /* brings the halo's values: received item k is halo cell k              */
 
@@ -31,9 +31,13 @@ typedef struct rm_stencil {
   const uint8_t *is_reduced;      /* [num_cells] 1: no polynomial is determined well: order 2 there        */
 } rm_stencil;
 
-/* takes_part [num_cells]: 0 for cells that are nobody's neighbour; NULL: all are. Collective. Lives in arena. */
+/* Neighbours without weights. takes_part [num_cells]: 0 for cells that are nobody's neighbour; NULL: all are. Collective. Lives
+ * in arena. */
 remap_status rm_stencil_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
                               const uint8_t *takes_part, const rm_stencil **out);
+
+/* The same stencil with weights. Not collective. Lives in arena and borrows from stencil. O(neighbours). NO_MEMORY. */
+remap_status rm_stencil_weigh(rm_arena *arena, const rm_mesh *mesh, const rm_stencil *stencil, const rm_stencil **out);
 
 /* Where the values of a mesh's cells stand in the caller's arrays. */
 typedef struct rm_layout {
@@ -42,8 +46,8 @@ typedef struct rm_layout {
   const int64_t *place;        /* [num_cells] place in its array, NULL: the number within what the array is of  */
 } rm_layout;
 
-/* A stencil for order 3 as well: near with more neighbours, hence with a halo and a plan of its own; it shares arrays with
- * near. second: rm_mesh_second of the mesh. Collective. Lives in arena. */
+/* A stencil for order 3 as well: near, which has weights, with more neighbours, hence with a halo and a plan of its own; it
+ * shares arrays with near. second: rm_mesh_second of the mesh. Collective. Lives in arena. */
 remap_status rm_stencil_widen(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
                               const double (*second)[6], const rm_stencil *near, const rm_stencil **out);
 

@@ -138,17 +138,19 @@ static inline double rm_dot6(const double h[6], const double s[6])
   return h[0] * s[0] + h[1] * s[1] + h[2] * s[2] + h[3] * s[3] + h[4] * s[4] + h[5] * s[5];
 }
 
-/* Moments of pair k of a row about a point x instead of its giver's centroid; second ones are 0 where there are none. */
-static inline void rm_moments_about(const rm_rows *rows, int64_t k, const double x[3], double m[3], double second[6])
+/* Moments of pair k of a row about a point x instead of its giver's centroid, from its volume and its moment about the latter;
+ * second ones are 0 where there are none. */
+static inline void rm_moments_about(const rm_rows *rows, int64_t k, double volume, const double moment[3], const double x[3],
+                                    double m[3], double second[6])
 {
-  const double *c = rows->giver_centroid[rows->giver[k]], *given = rows->moment[k], volume = rows->volume[k];
+  const double *c    = rows->giver_centroid[rows->giver[k]];
   const double  e[3] = {c[0] - x[0], c[1] - x[1], c[2] - x[2]};
 
-  for (int d = 0; d < 3; d++) m[d] = given[d] + e[d] * volume;
+  for (int d = 0; d < 3; d++) m[d] = moment[d] + e[d] * volume;
   for (int i = 0; i < 6; i++) {
     const int a = rm_row_of[i], b = rm_column_of[i];
 
-    second[i] = rows->second ? rows->second[k][i] + e[a] * given[b] + e[b] * given[a] + e[a] * e[b] * volume : 0.0;
+    second[i] = rows->second ? rows->second[k][i] + e[a] * moment[b] + e[b] * moment[a] + e[a] * e[b] * volume : 0.0;
   }
 }
 
@@ -411,8 +413,9 @@ static inline void rm_integral_add(rm_sum *sum, double x, double y)
   if (fabs(x * y) >= 0x1p-900 && fabs(x * y) < 0x1p1000) rm_sum_add_product(sum, x, y);
 }
 
-/* Add what the giving cells hold to source and magnitude of integral [num_fields]; flags are left out. Not collective. */
-void rm_integral_source(const rm_profile *profile, const rm_packing *packing, rm_integral *integral);
+/* Add what the giving cells hold to source and magnitude of integral [num_fields]; flags are left out. back: the rows of the
+ * receiving cells. Not collective. */
+void rm_integral_source(const rm_profile *profile, const rm_rows *back, const rm_packing *packing, rm_integral *integral);
 
 /* Reduce over all ranks and fill in the integrals of reports [num_fields]. Collective. Working memory from scratch. */
 remap_status rm_integral_report(rm_arena *scratch, const rm_transfer_setup *setup, int num_fields, const rm_integral *integral,

@@ -3,23 +3,25 @@
 #include "field_private.h"
 
 /* A partial cell gives what its pairs hold. Its rows have moments about the receiving cells' centroids; they are taken back. */
-static void add_partial(const rm_rows *rows, rm_lid cell, const double centroid[3], double value, const double *slope,
+static void add_partial(const rm_ground *ground, const rm_rows *back, rm_lid cell, double value, const double *slope,
                         const double *curvature, rm_integral *integral)
 {
+  const rm_rows *rows = ground->rows;
+
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const double volume = rows->volume[k];
-    double       m[3], second[6];
+    double       moment[3], m[3], second[6];
+    const double volume = rm_mapping_pair(rows, back, ground->mesh, cell, k, moment);
 
     rm_integral_add(&integral->source, value, volume);
     rm_integral_add(&integral->magnitude, fabs(value), fabs(volume));
     if (!slope) continue;
-    rm_moments_about(rows, k, centroid, m, second);
+    rm_moments_about(rows, k, volume, moment, ground->mesh->cell_centroid[cell], m, second);
     for (int d = 0; d < 3; d++) rm_integral_add(&integral->source, slope[d], m[d]);
     if (curvature) rm_integral_add(&integral->source, 1.0, rm_dot6(curvature, second) + curvature[6] * volume);
   }
 }
 
-void rm_integral_source(const rm_profile *w, const rm_packing *packing, rm_integral *integral)
+void rm_integral_source(const rm_profile *w, const rm_rows *back, const rm_packing *packing, rm_integral *integral)
 {
   const rm_rows *rows = w->ground.rows;
   const rm_mesh *mesh = w->ground.mesh;
@@ -39,7 +41,7 @@ void rm_integral_source(const rm_profile *w, const rm_packing *packing, rm_integ
         rm_integral_add(&integral[f].source, value, volume);
         rm_integral_add(&integral[f].magnitude, fabs(value), fabs(volume));
       } else if (rows->cover[c] == REMAP_PARTIAL) {
-        add_partial(rows, c, mesh->cell_centroid[c], value, slope, curvature, &integral[f]);
+        add_partial(&w->ground, back, c, value, slope, curvature, &integral[f]);
       }
     }
   }

@@ -91,7 +91,7 @@ static remap_status search_rest(rm_arena *scratch, const rm_comm *comm, const rm
 }
 
 /* Each origin once, by rank and number there, as the plan wants it; origin[k] is its place. */
-static remap_status list_origins(rm_arena *arena, rm_arena *scratch, const rm_origin *own, rm_nearest *nearest, rm_lid *origin,
+static remap_status list_origins(rm_arena *scratch, const rm_origin *own, rm_nearest *nearest, rm_lid *origin,
                                  int64_t *num_want, int **want_rank, rm_lid **want_cell)
 {
   const int64_t n = nearest->num;
@@ -100,8 +100,8 @@ static remap_status list_origins(rm_arena *arena, rm_arena *scratch, const rm_or
 
   RM_NEW(keyed, scratch, n);
   RM_NEW(spare, scratch, n);
-  RM_NEW(*want_rank, arena, n);
-  RM_NEW(*want_cell, arena, n);
+  RM_NEW(*want_rank, scratch, n);
+  RM_NEW(*want_cell, scratch, n);
   for (int64_t k = 0; k < n; k++) {
     const rm_origin *o = &own[nearest->cell[k]];
 
@@ -124,19 +124,19 @@ remap_status rm_nearest_build(rm_arena *arena, const rm_comm *comm, const rm_mes
 {
   rm_arena    *scratch   = rm_arena_new();
   rm_nearest  *nearest   = rm_arena_zero(arena, 1, sizeof *nearest);
-  rm_lid      *cell      = rm_arena_alloc(arena, mesh->num_cells, sizeof *cell);
-  rm_lid      *origin    = rm_arena_alloc(arena, mesh->num_cells, sizeof *origin);
+  rm_lid      *cell      = NULL, *origin = NULL;
   rm_lid      *waiting   = scratch ? rm_arena_alloc(scratch, mesh->num_cells, sizeof *waiting) : NULL;
   rm_origin   *own       = scratch ? rm_arena_alloc(scratch, mesh->num_cells, sizeof *own) : NULL;
   int         *want_rank = NULL;
   rm_lid      *want_cell = NULL;
-  int64_t      num_waiting, num_want = 0, most[1];
-  const bool   have   = nearest && cell && origin && waiting && own;
+  int64_t      num_waiting = 0, num_want = 0, most[1];
   remap_status status = REMAP_OK;
 
-  RM_GOTO(done, status = rm_comm_agree(comm, have ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  if (waiting && own) collect_unmapped(mesh, cover, waiting, &num_waiting, own);
+  cell   = waiting && own ? rm_arena_alloc(arena, num_waiting, sizeof *cell) : NULL;
+  origin = cell ? rm_arena_alloc(arena, num_waiting, sizeof *origin) : NULL;
+  RM_GOTO(done, status = rm_comm_agree(comm, nearest && origin ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(nearest && cell && origin && waiting && own);
-  collect_unmapped(mesh, cover, waiting, &num_waiting, own);
   nearest->num    = num_waiting;
   nearest->cell   = cell;
   nearest->origin = origin;
@@ -156,7 +156,7 @@ remap_status rm_nearest_build(rm_arena *arena, const rm_comm *comm, const rm_mes
   most[0] = num_waiting;
   RM_GOTO(done, status = rm_comm_max_i64(comm, most, 1));
   if (most[0] > 0) RM_GOTO(done, status = search_rest(scratch, comm, mesh, cover, waiting, num_waiting, own));
-  status = list_origins(arena, scratch, own, nearest, origin, &num_want, &want_rank, &want_cell);
+  status = list_origins(scratch, own, nearest, origin, &num_want, &want_rank, &want_cell);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   RM_GOTO(done, status = rm_plan_build(comm, arena, num_want, want_rank, want_cell, &nearest->plan));
   *out = nearest;

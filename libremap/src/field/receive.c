@@ -175,7 +175,7 @@ static void add_kept(const rm_receipt *w, int f, rm_lid cell, double old, const 
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
     double m[3], second[6];
 
-    rm_moments_about(rows, k, mesh->cell_centroid[cell], m, second);
+    rm_moments_about(rows, k, rows->volume[k], rows->moment[k], mesh->cell_centroid[cell], m, second);
     rm_compensated_add(&sum, -(g[0] * m[0] + g[1] * m[1] + g[2] * m[2]));
     if (w->packing->degree[f] > 1) rm_compensated_add(&sum, -rm_dot6(h, second));
   }

@@ -248,7 +248,7 @@ static remap_status pack_visitors(draft *d, const meeting *told, int64_t num_tol
 }
 
 /* Own cells' geometry, then each visiting cell once, by rank and number there; and the halo cells around each node. */
-static remap_status list_halo(draft *d, const int64_t *offset, const visitor *came, rm_stencil *stencil)
+static remap_status list_halo(draft *d, const int64_t *offset, const visitor *came)
 {
   const rm_mesh *mesh = d->mesh;
   const int64_t  n    = offset[d->comm->size];
@@ -265,11 +265,10 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
   rm_sort_keyed(keyed, spare, n);
   for (int64_t k = 0; k < n; k++) num += k == 0 || keyed[k].key != keyed[k - 1].key;
   if (num > INT32_MAX - mesh->num_cells) return REMAP_TOO_LARGE;
-  stencil->num_halo = (rm_lid)num;
-  d->num_all        = mesh->num_cells + (rm_lid)num;
+  d->num_all = mesh->num_cells + (rm_lid)num;
   RM_NEW(d->halo_rank, d->scratch, num);
   RM_NEW(d->halo_cell, d->scratch, num);
-  RM_NEW(d->centroid, d->arena, d->num_all);
+  RM_NEW(d->centroid, d->scratch, d->num_all);
   RM_NEW(d->volume, d->scratch, d->num_all);
   RM_NEW(d->global, d->scratch, d->num_all);
   for (rm_lid c = 0; c < mesh->num_cells; c++) {
@@ -291,7 +290,6 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
     d->volume[all] = v->volume;
     d->global[all] = v->global;
   }
-  stencil->halo_centroid = (const double(*)[3])(d->centroid + mesh->num_cells);
   RM_NEW0(d->node_halo_offset, d->scratch, (int64_t)mesh->num_nodes + 1);
   RM_NEW(d->node_halo, d->scratch, n);
   for (int64_t k = 0; k < n; k++) d->node_halo_offset[came[k].node]++;
@@ -302,7 +300,7 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
 }
 
 /* Find the cells of other ranks that share nodes with this one's. Collective. */
-static remap_status meet_other_ranks(draft *d, rm_stencil *stencil)
+static remap_status meet_other_ranks(draft *d)
 {
   const rm_comm *comm        = d->comm;
   int64_t       *send_offset = rm_arena_alloc(d->scratch, (int64_t)comm->size + 1, sizeof *send_offset);
@@ -324,11 +322,10 @@ static remap_status meet_other_ranks(draft *d, rm_stencil *stencil)
   RM_TRY(rm_comm_exchange(comm, d->scratch, sizeof *met, send_offset, met, recv_offset, &recv));
   RM_TRY(rm_comm_agree(comm, pack_visitors(d, recv, recv_offset[comm->size], send_offset, &visitors), NULL));
   RM_TRY(rm_comm_exchange(comm, d->scratch, sizeof *visitors, send_offset, visitors, recv_offset, &recv));
-  RM_TRY(rm_comm_agree(comm, list_halo(d, recv_offset, recv, stencil), NULL));
-  return rm_plan_build(comm, d->arena, stencil->num_halo, d->halo_rank, d->halo_cell, &stencil->plan);
+  return rm_comm_agree(comm, list_halo(d, recv_offset, recv), NULL);
 }
 
-/* ---- neighbours and weights ------------------------------------------------------------------------------------ */
+/* ---- neighbours ------------------------------------------------------------------------------------------------ */
 
 static int compare_lids(const void *a, const void *b)
 {
@@ -441,6 +438,33 @@ static int64_t neighbours_of_cell(const draft *d, const rm_stencil *stencil, rm_
   return l.num;
 }
 
+/* Of the halo cells only those stay that are neighbours: of crowded nodes, few. neighbour [offset[num_cells]] gets their new
+ * numbers. */
+static remap_status keep_used(draft *d, rm_stencil *stencil, rm_lid *neighbour)
+{
+  const rm_lid  own = stencil->num_cells, num = d->num_all - own;
+  const int64_t n = stencil->offset[own];
+  rm_lid       *new_of; /* [num] 1 + the new number, 0: nobody's neighbour */
+  double(*centroid)[3];
+
+  RM_NEW0(new_of, d->scratch, num);
+  for (int64_t k = 0; k < n; k++)
+    if (neighbour[k] >= own) new_of[neighbour[k] - own] = 1;
+  for (rm_lid h = 0; h < num; h++) {
+    if (new_of[h] == 0) continue;
+    d->halo_rank[stencil->num_halo] = d->halo_rank[h];
+    d->halo_cell[stencil->num_halo] = d->halo_cell[h];
+    new_of[h]                       = ++stencil->num_halo;
+  }
+  RM_NEW(centroid, d->arena, stencil->num_halo);
+  for (rm_lid h = 0; h < num; h++)
+    for (int i = 0; i < 3 && new_of[h] > 0; i++) centroid[new_of[h] - 1][i] = d->centroid[own + h][i];
+  for (int64_t k = 0; k < n; k++)
+    if (neighbour[k] >= own) neighbour[k] = own + new_of[neighbour[k] - own] - 1;
+  stencil->halo_centroid = (const double(*)[3])centroid;
+  return REMAP_OK;
+}
+
 static remap_status list_neighbours(draft *d, const rm_frame *frame, rm_stencil *stencil)
 {
   const rm_lid n = stencil->num_cells;
@@ -467,49 +491,7 @@ static remap_status list_neighbours(draft *d, const rm_frame *frame, rm_stencil 
   }
   stencil->offset    = offset;
   stencil->neighbour = neighbour;
-  return REMAP_OK;
-}
-
-/* What rounding leaves of the distances around a cell: centroids are good to a few units of their own last place. */
-static rm_distance_noise noise_of_cell(const draft *d, const rm_stencil *stencil, rm_lid cell)
-{
-  const double     *box = d->mesh->cell_box[cell];
-  rm_distance_noise noise;
-
-  for (int c = 0; c < 3; c++) {
-    double largest = fabs(d->centroid[cell][c]);
-
-    for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++)
-      largest = fmax(largest, fabs(d->centroid[stencil->neighbour[k]][c]));
-    noise.coordinate[c] = 0x1p-48 * largest;
-    noise.extent[c]     = box[c + 3] - box[c];
-  }
-  return noise;
-}
-
-static remap_status weigh_neighbours(draft *d, rm_stencil *stencil)
-{
-  int64_t most = 0;
-  double(*weight)[3], (*distance)[3], *spare;
-
-  for (rm_lid c = 0; c < stencil->num_cells; c++) {
-    const int64_t num = stencil->offset[c + 1] - stencil->offset[c];
-
-    if (num > most) most = num;
-  }
-  RM_NEW(weight, d->arena, stencil->offset[stencil->num_cells]);
-  RM_NEW(distance, d->scratch, most);
-  RM_NEW(spare, d->scratch, most);
-  for (rm_lid c = 0; c < stencil->num_cells; c++) {
-    const int64_t           first = stencil->offset[c], num = stencil->offset[c + 1] - first;
-    const rm_distance_noise noise = noise_of_cell(d, stencil, c);
-
-    for (int64_t k = 0; k < num; k++)
-      for (int i = 0; i < 3; i++) distance[k][i] = d->centroid[stencil->neighbour[first + k]][i] - d->centroid[c][i];
-    rm_leastsq_weights(num, distance, &noise, spare, weight + first);
-  }
-  stencil->weight = (const double(*)[3])weight;
-  return REMAP_OK;
+  return keep_used(d, stencil, neighbour);
 }
 
 remap_status rm_stencil_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *mesh,
@@ -521,12 +503,74 @@ remap_status rm_stencil_build(rm_arena *arena, const rm_comm *comm, const rm_fra
 
   if (status == REMAP_OK) status = list_nodes(&d, stencil);
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = meet_other_ranks(&d, stencil));
-  status = list_neighbours(&d, frame, stencil);
-  if (status == REMAP_OK) status = weigh_neighbours(&d, stencil);
-  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = meet_other_ranks(&d));
+  RM_GOTO(done, status = rm_comm_agree(comm, list_neighbours(&d, frame, stencil), NULL));
+  RM_GOTO(done, status = rm_plan_build(comm, arena, stencil->num_halo, d.halo_rank, d.halo_cell, &stencil->plan));
   *out = stencil;
 done:
   rm_arena_drop(d.scratch);
+  return status;
+}
+
+/* ---- weights ---------------------------------------------------------------------------------------------------- */
+
+static const double *centroid_of(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell)
+{
+  return cell < stencil->num_cells ? mesh->cell_centroid[cell] : stencil->halo_centroid[cell - stencil->num_cells];
+}
+
+/* What rounding leaves of the distances around a cell: centroids are good to a few units of their own last place. */
+static rm_distance_noise noise_of_cell(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell)
+{
+  const double     *box = mesh->cell_box[cell];
+  rm_distance_noise noise;
+
+  for (int c = 0; c < 3; c++) {
+    double largest = fabs(mesh->cell_centroid[cell][c]);
+
+    for (int64_t k = stencil->offset[cell]; k < stencil->offset[cell + 1]; k++)
+      largest = fmax(largest, fabs(centroid_of(stencil, mesh, stencil->neighbour[k])[c]));
+    noise.coordinate[c] = 0x1p-48 * largest;
+    noise.extent[c]     = box[c + 3] - box[c];
+  }
+  return noise;
+}
+
+static remap_status weigh_neighbours(rm_arena *arena, rm_arena *scratch, const rm_mesh *mesh, rm_stencil *stencil)
+{
+  int64_t most = 0;
+  double(*weight)[3], (*distance)[3], *spare;
+
+  for (rm_lid c = 0; c < stencil->num_cells; c++) {
+    const int64_t num = stencil->offset[c + 1] - stencil->offset[c];
+
+    if (num > most) most = num;
+  }
+  RM_NEW(weight, arena, stencil->offset[stencil->num_cells]);
+  RM_NEW(distance, scratch, most);
+  RM_NEW(spare, scratch, most);
+  for (rm_lid c = 0; c < stencil->num_cells; c++) {
+    const int64_t           first = stencil->offset[c], num = stencil->offset[c + 1] - first;
+    const rm_distance_noise noise = noise_of_cell(stencil, mesh, c);
+
+    for (int64_t k = 0; k < num; k++)
+      for (int i = 0; i < 3; i++)
+        distance[k][i] = centroid_of(stencil, mesh, stencil->neighbour[first + k])[i] - mesh->cell_centroid[c][i];
+    rm_leastsq_weights(num, distance, &noise, spare, weight + first);
+  }
+  stencil->weight = (const double(*)[3])weight;
+  return REMAP_OK;
+}
+
+remap_status rm_stencil_weigh(rm_arena *arena, const rm_mesh *mesh, const rm_stencil *stencil, const rm_stencil **out)
+{
+  rm_arena    *scratch = rm_arena_new();
+  rm_stencil  *weighed = rm_arena_alloc(arena, 1, sizeof *weighed);
+  remap_status status  = scratch && weighed ? REMAP_OK : REMAP_NO_MEMORY;
+
+  if (weighed) *weighed = *stencil;
+  if (status == REMAP_OK) status = weigh_neighbours(arena, scratch, mesh, weighed);
+  if (status == REMAP_OK) *out = weighed;
+  rm_arena_drop(scratch);
   return status;
 }

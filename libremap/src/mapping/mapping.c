@@ -299,12 +299,17 @@ done:
   return status;
 }
 
-/* What pair k of a source cell holds, about the target cell's centroid; not of cells that are the same. Returns its volume. */
-static double turn_round(const rm_mapping *mapping, const rm_mesh *mesh, rm_lid cell, int64_t k, double moment[3])
+double rm_mapping_pair(const rm_rows *rows, const rm_rows *back, const rm_mesh *mesh, rm_lid cell, int64_t k, double moment[3])
 {
-  const rm_rows *rows = &mapping->rows[REMAP_SOURCE], *back = &mapping->rows[REMAP_TARGET];
-  const rm_lid   twin = rows->twin[k];
-
+  if (rows->moment) {
+    memcpy(moment, rows->moment[k], 3 * sizeof *moment);
+    return rows->volume[k];
+  }
+  if (rows->same[cell]) {
+    memset(moment, 0, 3 * sizeof *moment);
+    return mesh->cell_volume[cell];
+  }
+  const rm_lid twin = rows->twin[k];
   if (twin < 0) {
     memcpy(moment, rows->away_moment[-1 - twin], 3 * sizeof *moment);
     return rows->away_volume[-1 - twin];
@@ -329,11 +334,9 @@ static void find_centroid_errors(const rm_mesh *mesh, const rm_mapping *mapping,
     if (rows->cover[c] != REMAP_COVERED || rows->same[c] || !(fabs(mesh->cell_volume[c]) > 0.0)) continue;
     for (int64_t k = first; k < end; k++) {
       const double *other = rows->giver_centroid[rows->giver[k]]; /* about which this row's moments are */
-
       double        own[3];
 
-      if (mesh->side == REMAP_TARGET) memcpy(own, rows->moment[k], sizeof own);
-      else turn_round(mapping, mesh, c, k, own);
+      rm_mapping_pair(rows, &mapping->rows[REMAP_TARGET], mesh, c, k, own);
       for (int d = 0; d < 3; d++) rm_compensated_add(&moment[d], own[d] + (other[d] - centroid[d]) * rows->volume[k]);
     }
     for (int d = 0; d < 3; d++) {
@@ -443,9 +446,8 @@ done:
 remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], const rm_mapping *mapping,
                                  const rm_mapping **out)
 {
-  const rm_mesh *source = mesh[REMAP_SOURCE];
-  const rm_rows *rows   = &mapping->rows[REMAP_SOURCE];
-  const int64_t  n      = rows->offset[rows->num_cells];
+  const rm_rows *rows = &mapping->rows[REMAP_SOURCE];
+  const int64_t  n    = rows->offset[rows->num_cells];
   rm_mapping    *all;
   double        *volume, (*moment)[3];
 
@@ -453,14 +455,8 @@ remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], 
   RM_NEW(volume, arena, n);
   RM_NEW(moment, arena, n);
   for (rm_lid c = 0; c < rows->num_cells; c++)
-    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++) {
-      if (rows->same[c]) {
-        volume[k] = source->cell_volume[c];
-        for (int d = 0; d < 3; d++) moment[k][d] = 0.0;
-      } else {
-        volume[k] = turn_round(mapping, source, c, k, moment[k]);
-      }
-    }
+    for (int64_t k = rows->offset[c]; k < rows->offset[c + 1]; k++)
+      volume[k] = rm_mapping_pair(rows, &mapping->rows[REMAP_TARGET], mesh[REMAP_SOURCE], c, k, moment[k]);
   *all                           = *mapping;
   all->rows[REMAP_SOURCE].volume = volume;
   all->rows[REMAP_SOURCE].moment = (const double(*)[3])moment;

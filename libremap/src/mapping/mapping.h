@@ -68,6 +68,9 @@ remap_status rm_mapping_close(rm_arena *arena, rm_gathering *gathering, const rm
  * borrows from mapping. O(pairs). NO_MEMORY. */
 remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], const rm_mapping *mapping,
                                  const rm_mapping **out);
+/* What pair k of a row, that of a cell of this mesh, holds: its volume is returned, with its moment. Where rows lack both, of
+ * source cells, back are the rows of the target cells. Not collective. */
+double rm_mapping_pair(const rm_rows *rows, const rm_rows *back, const rm_mesh *mesh, rm_lid cell, int64_t k, double moment[3]);
 /* All of it, of one part. Collective. Lives in arena. */
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason);
