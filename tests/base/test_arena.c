@@ -70,6 +70,25 @@ static void adopted_memory_is_the_arenas(void)
   rm_arena_drop(arena);
 }
 
+static void adopted_memory_can_be_taken_back(void)
+{
+  rm_arena *arena = rm_arena_new();
+  double   *apart[3], *taken;
+
+  for (int k = 0; k < 3; k++) {
+    apart[k] = rm_arena_alloc_apart(arena, 1000, sizeof **apart);
+    if (RT_CHECK(apart[k] != NULL)) apart[k][999] = k;
+  }
+  const size_t before = rm_arena_bytes(arena);
+  taken               = rm_arena_release(arena, apart[1]);
+  RT_CHECK(taken == apart[1]);
+  RT_EQ(before - rm_arena_bytes(arena), 8000);
+  RT_CHECK(rm_arena_alloc_apart(arena, INT64_MAX / 4, 8) == NULL);
+  rm_arena_drop(arena);
+  RT_EQ((int)taken[999], 1);
+  free(taken);
+}
+
 static void impossible_sizes_give_null(void)
 {
   rm_arena *arena = rm_arena_new();
@@ -173,6 +192,7 @@ static void counts_saturate(void)
 }
 
 RT_MAIN(RT_CASE(allocations_are_aligned_and_do_not_touch), RT_CASE(bytes_cover_what_was_asked), RT_CASE(zeroed_memory_is_zero),
-        RT_CASE(adopted_memory_is_the_arenas), RT_CASE(impossible_sizes_give_null), RT_CASE(the_chosen_allocation_fails),
+        RT_CASE(adopted_memory_is_the_arenas), RT_CASE(adopted_memory_can_be_taken_back),
+        RT_CASE(impossible_sizes_give_null), RT_CASE(the_chosen_allocation_fails),
         RT_CASE(nothing_can_be_dropped), RT_CASE(an_array_grows_and_keeps_its_content),
         RT_CASE(an_array_that_cannot_grow_stays), RT_CASE(counts_saturate))

@@ -127,6 +127,32 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
   tm_free(target);
 }
 
+static uint64_t hash_words(uint64_t hash, const void *data, size_t bytes)
+{
+  for (size_t k = 0; k + 4 <= bytes; k += 4) {
+    uint32_t word;
+    memcpy(&word, (const char *)data + k, 4);
+    hash = rm_hash_word(hash ^ word);
+  }
+  return hash;
+}
+
+/* Of the bits of all that a view hands out. */
+static uint64_t hash_of(const remap_supermesh_view *v)
+{
+  const size_t   nodes = (size_t)v->num_nodes, faces = (size_t)v->num_faces, cells = (size_t)v->num_cells;
+  const size_t   corners = (size_t)v->face_offset[faces];
+  const struct { const void *data; size_t bytes; } array[] = {
+      {v->node_xyz, 24 * nodes}, {v->node_global, 8 * nodes}, {v->face_offset, 8 * faces}, {v->face_node, 4 * corners},
+      {v->face_owner, 4 * faces}, {v->face_neighbour, 4 * faces}, {v->face_global, 8 * faces}, {v->face_from[0], 4 * faces},
+      {v->face_from[1], 4 * faces}, {v->cell_global, 8 * cells}, {v->cell_ancestor[0], 8 * cells},
+      {v->cell_ancestor[1], 8 * cells}, {v->cell_volume, 8 * cells}};
+  uint64_t hash = 0;
+
+  for (size_t k = 0; k < sizeof array / sizeof *array; k++) hash = hash_words(hash, array[k].data, array[k].bytes);
+  return hash;
+}
+
 /* remap_supermesh on all ranks; the meshes are dealt in slabs. */
 static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int keep)
 {
@@ -152,11 +178,11 @@ static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int kee
   const double t1 = bench_cpu();
   printf("{\"bench\":\"supermesh\",\"rank\":%d,\"ranks\":%d,\"maph\":%lld,\"maph_here\":%lld,\"faces\":%lld,\"nodes\":%lld,"
          "\"us_per_maph\":%.2f,\"bytes_peak_per_maph\":%.0f,\"s_partition\":%.3f,\"s_triangulation\":%.3f,\"s_crossings\":%.3f,"
-         "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f}\n",
+         "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f,\"hash\":\"%016llx\"}\n",
          rank, size, (long long)v.global_cells, (long long)v.num_cells, (long long)v.num_faces, (long long)v.num_nodes,
          1e6 * (t1 - t0) / (double)v.num_cells, (bench_heap_peak() - held) / (double)v.num_cells, v.seconds_partition,
          v.seconds_triangulation, v.seconds_crossings, v.seconds_polygons, v.seconds_cells, v.seconds_faces,
-         v.seconds_numbering, t1 - t0);
+         v.seconds_numbering, t1 - t0, (unsigned long long)hash_of(&v));
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mine[side]);
 }

@@ -362,7 +362,7 @@ typedef struct remap_supermesh_view {
   const int64_t *face_global;       /**< [num_faces]                                                      */
   const int32_t *face_from[2];      /**< [side][num_faces] the face of that mesh it lies in, by its number on the rank that
                                          lent it, block after block (of two that join, one); -1: none */
-  const int32_t *face_from_rank[2]; /**< [side][num_faces] that rank, -1                                  */
+  const int32_t *face_from_rank[2]; /**< [side][num_faces] that rank; any where there is none             */
   int64_t        num_beyond;        /**< faces without neighbour here behind which lies a cell of another rank; all others
                                          without are on the boundary of what was made */
   const int32_t *beyond_face;       /**< [num_beyond] ascending                                           */

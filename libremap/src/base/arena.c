@@ -21,6 +21,7 @@ typedef struct block {
 typedef struct adopted {
   struct adopted *next;
   void           *data;
+  size_t          bytes;
 } adopted;
 
 struct rm_arena {
@@ -116,30 +117,59 @@ remap_status rm_arena_adopt(rm_arena *arena, void *data, size_t bytes)
   adopted *a = rm_arena_alloc(arena, 1, sizeof *a);
 
   if (!a) return REMAP_NO_MEMORY;
-  *a = (adopted){arena->adopted, data};
+  *a = (adopted){arena->adopted, data, bytes};
   arena->adopted = a;
   arena->bytes += bytes;
   return REMAP_OK;
+}
+
+void *rm_arena_alloc_apart(rm_arena *arena, int64_t count, size_t size)
+{
+  void *data;
+
+  RM_ASSERT(count >= 0 && size > 0);
+  if (count < 0 || (uint64_t)count > (uint64_t)INT64_MAX / size) return NULL;
+  data = malloc(count ? (size_t)count * size : 1);
+  if (data && rm_arena_adopt(arena, data, (size_t)count * size) == REMAP_OK) return data;
+  free(data);
+  return NULL;
+}
+
+void *rm_arena_release(rm_arena *arena, const void *data)
+{
+  adopted **link = &arena->adopted, *a;
+
+  while (*link && (*link)->data != data) link = &(*link)->next;
+  a = *link;
+  RM_ASSERT(a);
+  *link = a->next; /* the record stays in its block */
+  arena->bytes -= a->bytes;
+  return a->data;
 }
 
 size_t rm_arena_bytes(const rm_arena *arena) { return arena->bytes; }
 
 void rm_arena_fail_at(rm_arena *arena, int64_t n) { arena->fail_in = n; }
 
+remap_status rm_reserve(void *data, int64_t *capacity, int64_t need, size_t size)
+{
+  void *old, *moved;
+
+  if (need <= *capacity) return REMAP_OK;
+  RM_REQUIRE(rm_mul_sat(need, (int64_t)size) < INT64_MAX, REMAP_NO_MEMORY);
+  memcpy(&old, data, sizeof old); /* data points to a pointer of some type */
+  moved = realloc(old, (size_t)need * size);
+  RM_REQUIRE(moved, REMAP_NO_MEMORY);
+  memcpy(data, &moved, sizeof moved);
+  *capacity = need;
+  return REMAP_OK;
+}
+
 remap_status rm_grow(void *data, int64_t *capacity, int64_t need, size_t size)
 {
   const int64_t half = rm_add_sat(*capacity, *capacity / 2), wish = half < 16 ? 16 : half;
-  const int64_t room = need > wish ? need : wish;
-  void         *old, *moved;
 
-  if (need <= *capacity) return REMAP_OK;
-  RM_REQUIRE(rm_mul_sat(room, (int64_t)size) < INT64_MAX, REMAP_NO_MEMORY);
-  memcpy(&old, data, sizeof old); /* data points to a pointer of some type */
-  moved = realloc(old, (size_t)room * size);
-  RM_REQUIRE(moved, REMAP_NO_MEMORY);
-  memcpy(data, &moved, sizeof moved);
-  *capacity = room;
-  return REMAP_OK;
+  return need <= *capacity ? REMAP_OK : rm_reserve(data, capacity, need > wish ? need : wish, size);
 }
 
 int64_t rm_add_sat(int64_t a, int64_t b)

@@ -59,6 +59,10 @@ void *rm_arena_alloc(rm_arena *arena, int64_t count, size_t size);
 void *rm_arena_zero(rm_arena *arena, int64_t count, size_t size);
 /* Hand malloc'ed memory of `bytes` over to the arena, which frees it with all else. NO_MEMORY: it stays the caller's. */
 remap_status rm_arena_adopt(rm_arena *arena, void *data, size_t bytes);
+/* Memory like that, of count * size bytes, for rm_arena_release to take; NULL if there is none. */
+void *rm_arena_alloc_apart(rm_arena *arena, int64_t count, size_t size);
+/* Take memory back that was adopted: it is the caller's, who frees it. data itself, not const any more. O(adopted pieces). */
+void *rm_arena_release(rm_arena *arena, const void *data);
 /* Bytes in use. */
 size_t rm_arena_bytes(const rm_arena *arena);
 /* ptr = RM_NEW(arena, count, type): returns NO_MEMORY from the calling function if there is none. Only where nothing is
@@ -77,6 +81,8 @@ void rm_arena_fail_at(rm_arena *arena, int64_t n);
 /* Room for `need` elements of `size` bytes in a malloc'ed array that grows by half: *data may move, *capacity is in elements.
  * Start from NULL and 0; the caller frees *data. NO_MEMORY leaves the array as it was. */
 remap_status rm_grow(void *data, int64_t *capacity, int64_t need, size_t size);
+/* The same with no more room than that: for arrays whose length is known. */
+remap_status rm_reserve(void *data, int64_t *capacity, int64_t need, size_t size);
 
 /* a + b of counts, saturating at INT64_MAX (so that an allocation of the result fails). Arguments >= 0. */
 int64_t rm_add_sat(int64_t a, int64_t b);

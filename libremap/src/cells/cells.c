@@ -203,7 +203,8 @@ static remap_status write_faces(work *w, const tally *t)
   RM_TRY(rm_grow(&p->first, &p->first_room, t->faces + 1, sizeof *p->first));
   RM_TRY(rm_grow(&p->vertex, &p->vertex_room, t->corners, sizeof *p->vertex));
   p->first[0] = 0;
-  RM_NEW(r.cell, w->arena, t->faces);
+  r.cell = rm_arena_alloc_apart(w->arena, t->faces, sizeof *r.cell);
+  if (!r.cell) return REMAP_NO_MEMORY;
   RM_NEW(r.own, w->arena, t->faces);
   RM_NEW(r.beyond, w->arena, w->out->num_beyond);
   RM_NEW(r.shared, w->arena, w->out->num_shared);

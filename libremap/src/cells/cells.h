@@ -42,7 +42,8 @@ typedef struct rm_spot {
  *   every vertex is used; loops have at least three vertices, none twice, and do not cross themselves;
  *   a loop's normal points out of face_cell[f][0], which is a cell always;
  *   cells are closed and their exact volumes positive (what rounding leaves of a sliver may not be);
- *   cells, faces and vertices are in an order that depends on coordinates alone. */
+ *   cells, faces and vertices are in an order that depends on coordinates alone.
+ * vertex, face_offset, face_vertex and face_cell were adopted by the arena: rm_arena_release takes them over. */
 typedef struct rm_cells {
   rm_lid          num_vertices, num_faces, num_cells, num_beyond, num_shared;
   const double  (*vertex)[3];        /* [num_vertices] mesh room's frame                                                     */

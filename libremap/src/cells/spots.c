@@ -119,7 +119,8 @@ remap_status rm_spot_coordinates(const rm_limit_home *home, rm_limit *l)
 {
   float *error, low[3];
 
-  RM_NEW(l->xyz, home->spots, l->num_spots);
+  l->xyz = rm_arena_alloc_apart(home->spots, l->num_spots, sizeof *l->xyz);
+  if (!l->xyz) return REMAP_NO_MEMORY;
   RM_NEW(error, home->rest, l->num_spots);
   for (rm_lid p = 0; p < l->num_spots; p++) place(l, &l->spot[p], l->xyz[p], low, &error[p]);
   l->error = error;

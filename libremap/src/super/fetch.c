@@ -20,7 +20,7 @@ static remap_status sort_wants(rm_arena *passing, int64_t n, const int32_t *from
   RM_NEW(key, passing, n);
   RM_NEW(spare, passing, n);
   for (int64_t k = 0; k < n; k++)
-    if (from_rank[k] >= 0) key[out->num++] = (rm_keyed){(uint64_t)from_rank[k], k};
+    if (from[k] >= 0) key[out->num++] = (rm_keyed){(uint64_t)from_rank[k], k};
   rm_sort_keyed(key, spare, out->num);
   RM_NEW(out->at, passing, out->num);
   RM_NEW(out->rank, passing, out->num);

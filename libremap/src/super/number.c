@@ -1,6 +1,6 @@
-/* number -- equal keys of all ranks get one number, in the order of the keys: each rank sorts its own, samples tell where to
- * cut, every key goes to the rank of its interval, is numbered there, and the number comes back. Words are sorted one after
- * the other, and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
+/* number -- equal keys of all ranks get one number, in the order of the keys: each rank has its own in order, samples tell
+ * where to cut, every key goes to the rank of its interval, is numbered there, and the number comes back. Words are sorted one
+ * after the other, and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -61,6 +61,15 @@ static remap_status start(rm_arena *passing, int64_t n, int words, const uint64_
   return REMAP_OK;
 }
 
+remap_status rm_super_rank(rm_arena *passing, int64_t n, int words, const uint64_t *key, int64_t *place, int64_t *num)
+{
+  keys k;
+
+  RM_TRY(start(passing, n, words, key, &k));
+  *num = rank_keys(&k, n, place);
+  return REMAP_OK;
+}
+
 static int compare(const uint64_t *a, const uint64_t *b, int words)
 {
   for (int w = 0; w < words; w++)
@@ -70,9 +79,8 @@ static int compare(const uint64_t *a, const uint64_t *b, int words)
 
 /* Several ranks: what each needs. */
 typedef struct dealing {
-  int64_t  *place;    /* [n] of a key among the distinct ones                    */
-  uint64_t *distinct; /* [num][words] in order                                   */
-  int64_t   num;
+  const uint64_t *key; /* [num][words] in order */
+  int64_t         num;
   int64_t  *send_offset, *recv_offset, *back_offset, *sample_offset; /* [size + 1] */
   uint64_t  sample[SAMPLES * RM_SOUP_CORNERS];
   int64_t   num_samples;
@@ -84,16 +92,12 @@ static remap_status prepare(rm_arena *passing, const rm_comm *comm, int64_t n, i
 {
   const int64_t share = ALL_SAMPLES / comm->size;
   const int64_t most  = share > SAMPLES ? SAMPLES : share > LEAST_SAMPLES ? share : LEAST_SAMPLES;
-  keys          k;
 
-  RM_TRY(start(passing, n, words, key, &k));
-  RM_NEW(d->place, passing, n);
-  d->num = rank_keys(&k, n, d->place);
-  RM_NEW(d->distinct, passing, d->num * words);
-  for (int64_t i = 0; i < n; i++) memcpy(d->distinct + d->place[i] * words, key + i * words, sizeof *key * (size_t)words);
-  d->num_samples = d->num < most ? d->num : most;
+  d->key         = key;
+  d->num         = n;
+  d->num_samples = n < most ? n : most;
   for (int64_t s = 0; s < d->num_samples; s++)
-    memcpy(d->sample + s * words, d->distinct + d->num * s / d->num_samples * words, sizeof *key * (size_t)words);
+    memcpy(d->sample + s * words, key + n * s / d->num_samples * words, sizeof *key * (size_t)words);
   RM_NEW(d->send_offset, passing, (int64_t)comm->size + 1);
   RM_NEW(d->recv_offset, passing, (int64_t)comm->size + 1);
   RM_NEW(d->back_offset, passing, (int64_t)comm->size + 1);
@@ -101,7 +105,7 @@ static remap_status prepare(rm_arena *passing, const rm_comm *comm, int64_t n, i
   return REMAP_OK;
 }
 
-/* Where each rank's interval of keys ends among the distinct ones: at the samples' quantiles. */
+/* Where each rank's interval ends among the keys here: at the samples' quantiles. */
 static remap_status cut(rm_arena *passing, const rm_comm *comm, int words, uint64_t *sample, dealing *d)
 {
   const int64_t num = d->sample_offset[comm->size];
@@ -116,7 +120,7 @@ static remap_status cut(rm_arena *passing, const rm_comm *comm, int words, uint6
 
     while (num && low < high) {
       const int64_t middle = (low + high) / 2;
-      if (compare(d->distinct + middle * words, sample + k.order[num * r / comm->size].item * words, words) < 0)
+      if (compare(d->key + middle * words, sample + k.order[num * r / comm->size].item * words, words) < 0)
         low = middle + 1;
       else high = middle;
     }
@@ -137,37 +141,26 @@ static remap_status number_here(rm_arena *passing, const rm_comm *comm, int word
   return REMAP_OK;
 }
 
-static remap_status deal(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
-                         int64_t *total)
+remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
+                             int64_t *total)
 {
   const size_t size = sizeof *key * (size_t)words;
   dealing      d    = {0};
   void        *samples = NULL, *arrived, *answers;
   int64_t      here = 0, before;
 
+  RM_ASSERT(comm->size > 1 && words <= RM_SOUP_CORNERS);
   RM_TRY(rm_comm_agree(comm, prepare(passing, comm, n, words, key, &d), NULL));
   RM_TRY(rm_comm_allgatherv(comm, passing, d.sample, d.num_samples, size, d.sample_offset, &samples));
   RM_TRY(rm_comm_agree(comm, cut(passing, comm, words, samples, &d), NULL));
-  RM_TRY(rm_comm_exchange(comm, passing, size, d.send_offset, d.distinct, d.recv_offset, &arrived));
+  RM_TRY(rm_comm_exchange(comm, passing, size, d.send_offset, key, d.recv_offset, &arrived));
   d.arrived = arrived;
   RM_TRY(rm_comm_agree(comm, number_here(passing, comm, words, &d, &here), NULL));
   before = here;
   RM_TRY(rm_comm_exscan_i64(comm, &before));
   for (int64_t i = 0; i < d.recv_offset[comm->size]; i++) d.answer[i] += before;
   RM_TRY(rm_comm_exchange(comm, passing, sizeof *d.answer, d.recv_offset, d.answer, d.back_offset, &answers));
-  for (int64_t i = 0; i < n; i++) number[i] = ((const int64_t *)answers)[d.place[i]];
+  if (n) memcpy(number, answers, sizeof *number * (size_t)n); /* keys went in order, so do answers come */
   *total = here;
   return rm_comm_sum_i64(comm, total, 1);
-}
-
-remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
-                             int64_t *total)
-{
-  keys k;
-
-  RM_ASSERT(words <= RM_SOUP_CORNERS);
-  if (comm->size > 1) return deal(passing, comm, n, words, key, number, total);
-  RM_TRY(start(passing, n, words, key, &k));
-  *total = rank_keys(&k, n, number);
-  return REMAP_OK;
 }

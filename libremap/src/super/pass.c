@@ -29,7 +29,10 @@ static remap_status add_cells(work *w)
   for (int side = 0; side < 2; side++) {
     const rm_mesh *m    = w->job->mesh[side];
     rm_lid         most = -1;
+    int64_t        num  = 0;
 
+    for (rm_lid c = 0; c < m->num_cells && rm_super_passes(w->job, side); c++) num += !w->cover->is_met[side][c];
+    RM_TRY(rm_soup_reserve(w->soup, 0, 0, 0, num));
     RM_NEW(w->soup_cell[side], w->scratch, m->num_cells);
     for (rm_lid f = 0; f < m->num_faces; f++) most = rm_given_face(m, f) > most ? rm_given_face(m, f) : most;
     RM_NEW0(w->is_sent[side], w->scratch, (int64_t)most + 1);
@@ -42,7 +45,7 @@ static remap_status add_cells(work *w)
       cell.home[side]       = c;
       cell.rank[side]       = w->job->comm->rank;
       w->soup_cell[side][c] = (rm_lid)w->soup->num_cells;
-      RM_TRY(rm_soup_add_cell(w->soup, cell));
+      RM_TRY(rm_soup_add_cell(w->soup, &cell));
     }
   }
   return REMAP_OK;
@@ -53,9 +56,10 @@ static remap_status add_cells(work *w)
 /* The passing cell behind face f of what was made; -1 if there is none. */
 static rm_lid cell_behind(const work *w, rm_lid f, int *side)
 {
-  const rm_lid *beyond = rm_cells_beyond(w->cells, f);
+  const rm_lid behind = w->soup->face_cell[f][1], *beyond;
 
-  if (!beyond) return -1;
+  if (behind >= RM_OUTSIDE) return -1;
+  beyond = w->cells->beyond[-2 - behind];
   *side = beyond[0] >= 0 ? 0 : 1;
   if (beyond[*side] < 0 || beyond[1 - *side] >= 0 || !rm_super_passes(w->job, *side)) return -1;
   return w->cover->flag[*side][beyond[*side]] & RM_COVER_MET ? -1 : beyond[*side];
@@ -80,20 +84,22 @@ typedef struct parcel {
 static void pack(const work *w, int64_t *next_face, int64_t *next_xyz, parcel *p)
 {
   for (rm_lid f = 0; f < w->cells->num_faces; f++) {
-    const int64_t first = w->cells->face_offset[f], n = w->cells->face_offset[f + 1] - first;
+    const rm_soup *s     = w->soup;
+    const int64_t  first = s->first[f], n = s->first[f + 1] - s->first[f];
     int           side;
     const rm_lid  cell = cell_behind(w, f, &side);
 
     if (cell < 0) continue;
-    const rm_piece     *piece = &w->cover->part.piece[side];
-    const int           home  = piece->cell_home_rank[cell];
-    const rm_soup_face *made  = &w->soup->face[f];
+    const rm_piece *piece = &w->cover->part.piece[side];
+    const int       home  = piece->cell_home_rank[cell];
     if (p->face) {
       p->face[next_face[home]] = (wire_face){side, (int32_t)n, piece->cell_home[cell],
                                              face_at_home(w, side, rm_cells_triangle(w->cells, f, side), cell),
-                                             {made->from[0], made->from[1]}, {made->from_rank[0], made->from_rank[1]}};
+                                             {s->from[0][f], s->from[1][f]},
+                                             {rm_soup_rank(s->from_rank[0], s->from[0], f),
+                                              rm_soup_rank(s->from_rank[1], s->from[1], f)}};
       for (int64_t k = 0; k < n; k++)
-        memcpy(p->xyz[next_xyz[home] + k], w->cells->vertex[w->cells->face_vertex[first + k]], sizeof *p->xyz);
+        memcpy(p->xyz[next_xyz[home] + k], s->xyz[s->loop[first + k]], sizeof *p->xyz);
     }
     next_face[home]++;
     next_xyz[home] += n;
@@ -121,8 +127,9 @@ static remap_status make_parcels(const work *w, parcel *p)
 }
 
 /* Add faces that have come home, turned to point out of the cells that pass. */
-static remap_status add_arrived(work *w, int64_t num, const wire_face *face, const double (*xyz)[3])
+static remap_status add_arrived(work *w, int64_t num, const wire_face *face, int64_t corners, const double (*xyz)[3])
 {
+  RM_TRY(rm_soup_reserve(w->soup, corners, num, corners, 0));
   for (int64_t k = 0; k < num; k++) {
     const wire_face *f = &face[k];
     rm_lid           vertex;
@@ -133,8 +140,9 @@ static remap_status add_arrived(work *w, int64_t num, const wire_face *face, con
       RM_TRY(rm_soup_add_corner(w->soup, xyz[i], &vertex));
       RM_TRY(rm_soup_add_to_loop(w->soup, vertex));
     }
-    RM_TRY(rm_soup_end_face(w->soup, (rm_soup_face){0, {w->soup_cell[f->side][f->cell], -1}, {f->from[0], f->from[1]},
-                                                    {f->from_rank[0], f->from_rank[1]}}));
+    const rm_soup_face made = {
+        {w->soup_cell[f->side][f->cell], -1}, {f->from[0], f->from[1]}, {f->from_rank[0], f->from_rank[1]}};
+    RM_TRY(rm_soup_end_face(w->soup, &made));
     xyz += f->num;
   }
   return REMAP_OK;
@@ -149,10 +157,38 @@ static remap_status exchange(work *w)
   RM_TRY(rm_comm_agree(comm, make_parcels(w, &p), NULL));
   RM_TRY(rm_comm_exchange(comm, w->scratch, sizeof *p.face, p.face_offset, p.face, p.face_arrives, &face));
   RM_TRY(rm_comm_exchange(comm, w->scratch, sizeof *p.xyz, p.xyz_offset, p.xyz, p.xyz_arrives, &xyz));
-  return rm_comm_agree(comm, add_arrived(w, p.face_arrives[comm->size], face, xyz), NULL);
+  return rm_comm_agree(comm, add_arrived(w, p.face_arrives[comm->size], face, p.xyz_arrives[comm->size], xyz),
+                       NULL);
 }
 
 /* ---- faces between cells that pass, and of the skin -------------------------------------------------------------- */
+
+/* The soup's cells beside face f of the mesh; false if it is none of the faces that pass. */
+static bool passes(const work *w, int side, rm_lid f, rm_lid cell[2])
+{
+  const rm_mesh *m = w->job->mesh[side];
+
+  for (int h = 0; h < 2; h++) cell[h] = m->face_cell[f][h] < 0 ? -1 : w->soup_cell[side][m->face_cell[f][h]];
+  return cell[0] >= 0 && (cell[1] >= 0 || m->face_cell[f][1] < 0) && !w->is_sent[side][rm_given_face(m, f)];
+}
+
+/* Room for those faces and their nodes, which get the number -1. */
+static remap_status reserve_faces(work *w, int side, rm_lid *vertex)
+{
+  const rm_mesh *m = w->job->mesh[side];
+  int64_t        faces = 0, corners = 0, nodes = 0;
+  rm_lid         cell[2];
+
+  for (rm_lid v = 0; v < m->num_nodes; v++) vertex[v] = 0;
+  for (rm_lid f = 0; f < m->num_faces; f++) {
+    if (!passes(w, side, f, cell)) continue;
+    faces++;
+    corners += m->face_offset[f + 1] - m->face_offset[f];
+    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) vertex[m->face_node[k]] = -1;
+  }
+  for (rm_lid v = 0; v < m->num_nodes; v++) nodes += vertex[v] < 0;
+  return rm_soup_reserve(w->soup, nodes, faces, corners, 0);
+}
 
 static remap_status add_faces(work *w, int side)
 {
@@ -161,22 +197,20 @@ static remap_status add_faces(work *w, int side)
   rm_lid        *vertex;
 
   RM_NEW(vertex, w->scratch, m->num_nodes);
-  for (rm_lid v = 0; v < m->num_nodes; v++) vertex[v] = -1;
+  RM_TRY(reserve_faces(w, side, vertex));
   for (rm_lid f = 0; f < m->num_faces; f++) {
-    const int64_t first = m->face_offset[f], n = m->face_offset[f + 1] - first;
-    rm_lid        cell[2];
+    rm_lid cell[2];
 
-    for (int h = 0; h < 2; h++) cell[h] = m->face_cell[f][h] < 0 ? -1 : w->soup_cell[side][m->face_cell[f][h]];
-    if (cell[0] < 0 || (cell[1] < 0 && m->face_cell[f][1] >= 0) || w->is_sent[side][rm_given_face(m, f)]) continue;
-    for (int64_t k = first; k < first + n; k++) {
+    if (!passes(w, side, f, cell)) continue;
+    for (int64_t k = m->face_offset[f]; k < m->face_offset[f + 1]; k++) {
       rm_lid *v = &vertex[m->face_node[k]];
       if (*v < 0) RM_TRY(rm_soup_add_corner(w->soup, m->node_xyz[m->face_node[k]], v));
       RM_TRY(rm_soup_add_to_loop(w->soup, *v));
     }
-    rm_soup_face face = {0, {cell[0], cell[1]}, {-1, -1}, {-1, -1}};
+    rm_soup_face face = {{cell[0], cell[1]}, {-1, -1}, {-1, -1}};
     face.from[side]      = rm_given_face(m, f);
     face.from_rank[side] = rank;
-    RM_TRY(rm_soup_end_face(w->soup, face));
+    RM_TRY(rm_soup_end_face(w->soup, &face));
   }
   return REMAP_OK;
 }
@@ -186,27 +220,6 @@ static remap_status add_all_faces(work *w)
   for (int side = 0; side < 2; side++)
     if (rm_super_passes(w->job, side)) RM_TRY(add_faces(w, side));
   return REMAP_OK;
-}
-
-remap_status rm_super_reserve(const rm_super_job *job, const rm_cover *cover, const rm_cells *cells, rm_soup *soup)
-{
-  int64_t passing = 0, faces = 0, corners = 0, nodes = 0;
-
-  for (int side = 0; side < 2; side++) {
-    const rm_mesh *m = job->mesh[side];
-
-    if (!rm_super_passes(job, side)) continue;
-    for (rm_lid c = 0; c < m->num_cells; c++) {
-      if (cover->is_met[side][c]) continue;
-      passing++;
-      faces += m->cell_face_offset[c + 1] - m->cell_face_offset[c];
-      for (int64_t k = m->cell_face_offset[c]; k < m->cell_face_offset[c + 1]; k++)
-        corners += m->face_offset[m->cell_face[k] + 1] - m->face_offset[m->cell_face[k]];
-    }
-    nodes += corners < m->num_nodes ? corners : m->num_nodes;
-  }
-  return rm_soup_reserve(soup, cells->num_vertices + nodes, cells->num_faces + faces,
-                         cells->face_offset[cells->num_faces] + corners, cells->num_cells + passing);
 }
 
 remap_status rm_super_pass(const rm_super_job *job, const rm_cover *cover, const rm_trimesh *const mesh[2],

@@ -115,8 +115,8 @@ static remap_status make_core(work *w, const bool all[2], bool *regular, rm_reas
 
 static remap_status fill_soup(work *w)
 {
-  RM_TRY(rm_super_reserve(w->job, w->cover, w->cells, &w->soup));
-  return rm_soup_add_cells(&w->soup, &w->cover->part, w->mesh, w->cells);
+  w->soup.has_ranks = w->job->comm->size > 1;
+  return rm_soup_add_cells(&w->soup, w->passing, &w->cover->part, w->mesh, w->cells);
 }
 
 static remap_status build(rm_arena *arena, work *w, rm_super *out, rm_reason *reason)

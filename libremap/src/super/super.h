@@ -5,7 +5,7 @@
  * the supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are
  * made of and not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and
  * numbered in one order. Zones of one mesh that touch without matching faces are joined first, in the same way. O(n log n)
- * time; on top of what room cells needs, some 650 bytes (centre) for each cell of the result while it is numbered. */
+ * time; numbering takes less memory than room cells does, some 650 bytes (centre) for each cell of the result. */
 #ifndef RM_SUPER_H
 #define RM_SUPER_H
 
@@ -14,7 +14,7 @@
 typedef struct rm_super {
   remap_supermesh_view view;
   const rm_lid        *cell_home[2]; /* [side][num_cells] the ancestor's number on its home rank, -1 */
-  const int           *cell_rank[2]; /* [side][num_cells] that rank, -1                              */
+  const int           *cell_rank[2]; /* [side][num_cells] that rank, any where there is none          */
 } rm_super;
 
 /* The zones of a mesh, as in remap_mesh. */
@@ -38,7 +38,7 @@ typedef struct rm_super_job {
 /* Collective. Lives in arena. Failures are those of remap_supermesh, the same on every rank. */
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason);
 
-/* out[k] = in[item from[k] of rank from_rank[k]], `size` bytes each, *none where that rank is -1, for k < n; untouched after a
+/* out[k] = in[item from[k] of rank from_rank[k]], `size` bytes each, *none where from[k] is -1, for k < n; untouched after a
  * failure. Collective. */
 remap_status rm_super_fetch(const rm_comm *comm, int64_t n, const int32_t *from, const int32_t *from_rank, size_t size,
                             const void *in, const void *none, void *out);
