@@ -1,5 +1,6 @@
 /* The bits of one rank on any number of ranks: pairs, fields, reports and statistics, for partitions and numberings by lot,
- * with the caller's global ids and without, masked and moved; and in one round or in many, of a few cells each. */
+ * with the caller's global ids and without, masked and moved; and in one block of a rank or in many, of a few cells each,
+ * with pairs that go home in one slice or in many. */
 #include "api/context.h"
 #include "meshes.h"
 #include "rt.h"
@@ -65,6 +66,7 @@ static void open_world(world *w, MPI_Comm comm, uint64_t seed, bool has_ids, int
   MPI_Comm_size(comm, &size);
   RT_EQ(remap_create(comm, NULL, &w->ctx), REMAP_OK);
   if (triangles) w->ctx->slicing = (rm_slicing){triangles, INFINITY};
+  if (triangles) w->ctx->slice = triangles / 4;
   for (int side = 0; side < 2; side++) {
     tm_mesh *whole = make(side, seed);
     int     *deal  = tm_deal(whole, size, seed % 3 ? TM_RANDOM : TM_SLABS, seed);
@@ -185,12 +187,12 @@ static void everything_has_the_bits_of_one_rank_with_giants(void)
 {
   for (uint64_t k = 0; k < 6; k++) look(GIANTS + (rt_size() > 8 ? 3 * k : k), k % 2 == 0, 0);
 }
-/* Builds only: moves overlay all at once. Down to a cell or two in a round. */
-static void everything_has_the_bits_of_one_round_in_many_rounds(void)
+/* Builds only: moves overlay all at once. Down to a cell or two in a block. */
+static void everything_has_the_bits_of_one_block_in_many_blocks(void)
 {
   for (uint64_t seed = 2; seed <= num_seeds() + 2; seed += 2) look(seed, true, seed % 4 ? 300 : 20);
   for (uint64_t k = 0; k < 6; k += 2) look(GIANTS + k, true, 40);
 }
 
 RT_MAIN(RT_CASE(everything_has_the_bits_of_one_rank_with_giants), RT_CASE(everything_has_the_bits_of_one_rank_with_ids),
-        RT_CASE(everything_has_the_bits_of_one_rank_without_ids), RT_CASE(everything_has_the_bits_of_one_round_in_many_rounds))
+        RT_CASE(everything_has_the_bits_of_one_rank_without_ids), RT_CASE(everything_has_the_bits_of_one_block_in_many_blocks))

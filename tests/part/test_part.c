@@ -491,7 +491,7 @@ static remap_status run_stages(world *w, rm_arena *arena)
   RM_TRY(rm_part_cut_work(arena, comm, &tags, work, &cuts));
   RM_TRY(rm_part_move_tags(arena, comm, &tags, &cuts, &moved, &reason));
   RM_TRY(rm_part_match(arena, arena, comm, &cuts, &moved, &giants, &rm_one_block, &routes));
-  return rm_part_ship(w->in.arena, arena, &w->in.comm, w->in.mesh[REMAP_SOURCE], &routes.round[0].of[REMAP_SOURCE], &piece,
+  return rm_part_ship(w->in.arena, arena, &w->in.comm, w->in.mesh[REMAP_SOURCE], &routes.of[REMAP_SOURCE], &piece,
                       &reason);
 }
 

@@ -29,15 +29,15 @@ static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
   return rm_comm_max_f64(&ctx->comm, magnitude, 2);
 }
 
-/* One of several rounds, of which progress is told as of one. */
+/* One of a rank's blocks, of which progress is told as of one. */
 typedef struct turn {
   remap_context *ctx;
-  int            round, num_rounds;
+  int            block, num_blocks;
 } turn;
 
 static remap_status tell(const turn *t, const char *phase, double done)
 {
-  return rm_context_progress(t->ctx, phase, (t->round + done) / t->num_rounds);
+  return rm_context_progress(t->ctx, phase, (t->block + done) / t->num_blocks);
 }
 
 static int tell_of_overlay(void *user, const char *phase, double done) { return tell(user, phase, done) != REMAP_OK; }
@@ -59,50 +59,52 @@ static remap_status overlay_pairs(turn *t, rm_arena *arena, int64_t *crossings, 
   return status;
 }
 
-/* What happens on this rank alone in a round. keeps: the next overlay may use the triangles. */
-static remap_status overlay_here(turn *t, bool keeps, rm_arena *arena, int64_t *crossings, const rm_moments **moments,
-                                 rm_reason *reason)
-{
-  if (!arena) return REMAP_NO_MEMORY;
-  for (int side = 0; side < 2; side++) RM_TRY(rm_context_triangulate(t->ctx, side));
-  RM_TRY(tell(t, "triangulation", 1));
-  RM_TRY(overlay_pairs(t, arena, crossings, moments, reason));
-  for (int side = 0; side < 2 && !keeps; side++) rm_context_drop_triangles(t->ctx, side);
-  return tell(t, "volumes and moments", 1);
-}
-
-/* A round: its cells brought together, overlaid, and the pairs sent home. *seconds grows by what the first takes.
- * Collective. */
-static remap_status overlay_round(turn *t, bool keeps, rm_gathering *gathering, int64_t *crossings, double *seconds,
+/* A block: its cells taken, overlaid, and the pairs added; the next overlay may use the triangles if it keeps them. *seconds
+ * grows by what the first takes. Not collective. */
+static remap_status overlay_block(turn *t, bool keeps, rm_gathering *gathering, int64_t *crossings, double *seconds,
                                   rm_reason *reason)
 {
-  remap_context    *ctx     = t->ctx;
-  const double      start   = rm_seconds();
-  const rm_moments *moments = NULL;
+  remap_context    *ctx   = t->ctx;
+  const double      start = rm_seconds();
+  const rm_moments *moments;
   rm_arena         *arena;
   remap_status      status;
 
-  RM_TRY(rm_context_place_round(ctx, t->round, reason));
+  RM_TRY(rm_context_take_block(ctx, t->block, reason));
   *seconds += rm_seconds() - start;
+  for (int side = 0; side < 2; side++) RM_TRY(rm_context_triangulate(ctx, side));
+  RM_TRY(tell(t, "triangulation", 1));
   arena = rm_arena_new();
-  RM_GOTO(done, status = stage(ctx, overlay_here(t, keeps, arena, crossings, &moments, reason), reason));
-  status = rm_mapping_add(gathering, &ctx->comm, &ctx->place.part, moments, reason);
+  RM_GOTO(done, status = arena ? overlay_pairs(t, arena, crossings, &moments, reason) : REMAP_NO_MEMORY);
+  for (int side = 0; side < 2 && !keeps; side++) rm_context_drop_triangles(ctx, side);
+  RM_GOTO(done, status = rm_mapping_add(gathering, &ctx->place.part, moments));
+  status = tell(t, "volumes and moments", 1);
 done:
   rm_arena_drop(arena);
   return status;
 }
 
-/* All rounds, and the mapping of the pairs that they make. *seconds is what it takes to bring cells together. Collective. */
+/* What happens on this rank alone, block by block. Not collective: a rank that fails ends its own blocks. */
+static remap_status overlay_here(remap_context *ctx, bool keeps, rm_gathering *gathering, int64_t *crossings, double *seconds,
+                                 rm_reason *reason)
+{
+  turn         t      = {ctx, 0, rm_part_blocks(ctx->place.routes)};
+  remap_status status = gathering ? REMAP_OK : REMAP_NO_MEMORY;
+
+  for (; t.block < t.num_blocks && status == REMAP_OK; t.block++)
+    status = overlay_block(&t, keeps, gathering, crossings, seconds, reason);
+  return status;
+}
+
+/* All blocks, and the mapping of the pairs that they make. *seconds is what it takes to bring cells together. Collective. */
 static remap_status overlay_all(remap_context *ctx, bool keeps, int64_t *crossings, double *seconds, rm_reason *reason)
 {
-  rm_gathering *gathering = rm_mapping_open(ctx->mesh, has_second(ctx));
-  turn          t         = {ctx, 0, rm_part_rounds(ctx->place.routes)};
-  remap_status  status    = rm_comm_agree(&ctx->comm, gathering ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+  rm_gathering *gathering = rm_mapping_open(ctx->mesh, has_second(ctx), ctx->slice);
+  remap_status  status    = stage(ctx, overlay_here(ctx, keeps, gathering, crossings, seconds, reason), reason);
 
-  for (; t.round < t.num_rounds && status == REMAP_OK; t.round++)
-    status = overlay_round(&t, keeps, gathering, crossings, seconds, reason);
   if (!keeps) rm_context_drop_place(ctx);
-  if (status == REMAP_OK) status = rm_mapping_close(ctx->arena, gathering, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->mapping);
+  if (status == REMAP_OK)
+    status = rm_mapping_close(ctx->arena, gathering, &ctx->comm, &ctx->frame, ctx->mesh, &ctx->mapping, reason);
   rm_gathering_drop(gathering);
   return status;
 }
@@ -114,7 +116,6 @@ static remap_status overlay_all(remap_context *ctx, bool keeps, int64_t *crossin
 static remap_status find_zone_overlap(remap_context *ctx, int side, double magnitude, rm_zone_overlap *out, rm_reason *reason)
 {
   const rm_labels *labels = &ctx->labels[side];
-  const bool       is_one = rm_part_rounds(ctx->place.routes) == 1;
   rm_piece         all    = ctx->place.part.piece[side];
   int64_t          zones  = labels->num_zones;
   rm_arena        *arena;
@@ -124,16 +125,14 @@ static remap_status find_zone_overlap(remap_context *ctx, int side, double magni
   RM_TRY(rm_comm_max_i64(&ctx->comm, &zones, 1)); /* a rank without cells need not say */
   if (zones < 2) return REMAP_OK;
   arena = rm_arena_new();
-  RM_GOTO(done, status = stage(ctx, arena ? REMAP_OK : REMAP_NO_MEMORY, reason));
-  if (!is_one)
-    RM_GOTO(done, status = rm_part_send(arena, &ctx->comm, ctx->mesh[side], ctx->place.routes, RM_EVERY_ROUND, &all, reason));
-  status = stage(ctx,
-                 rm_zone_overlap_find(&ctx->frame, &all, ctx->options.faces, labels->num_zones, labels->zone_cell_offset,
-                                      magnitude, out, reason),
-                 reason);
-done:
+  status = arena ? REMAP_OK : REMAP_NO_MEMORY;
+  if (status == REMAP_OK && ctx->place.stock[side])
+    status = rm_part_take(arena, ctx->place.routes, ctx->place.stock[side], RM_EVERY_BLOCK, &all, reason);
+  if (status == REMAP_OK)
+    status = rm_zone_overlap_find(&ctx->frame, &all, ctx->options.faces, labels->num_zones, labels->zone_cell_offset, magnitude,
+                                  out, reason);
   rm_arena_drop(arena);
-  return status;
+  return stage(ctx, status, reason);
 }
 
 /* The largest overlap of two zones over all ranks. */

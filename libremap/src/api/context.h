@@ -17,10 +17,12 @@ typedef struct rm_labels {
 /* Where the cells of both meshes are overlaid. */
 typedef struct rm_place {
   rm_arena         *arena;          /* of routes and boxes                                               */
+  rm_arena         *stock_arena[2]; /* [side] of the stock                                               */
   rm_arena         *piece_arena[2]; /* [side] of the piece                                               */
   rm_arena         *triangle_arena[2]; /* [side] of its triangles                                        */
   const rm_routes  *routes;         /* NULL: none are chosen                                             */
-  rm_part           part;           /* what came along them                                              */
+  const rm_stock   *stock[2];       /* [side] what came along them, until it is kept as a piece          */
+  rm_part           part;           /* of the block that is overlaid                                     */
   const rm_trimesh *trimesh[2];     /* [side] of the piece; NULL until made                              */
   rm_frame          frame;          /* that the triangles are for                                        */
   const double    (*box[2])[6];     /* [side][cells of this rank] as they were when routes were chosen   */
@@ -28,11 +30,11 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
-/* What one rank alone overlays at once at most: about 3300 hexahedra of either mesh, for which the overlay takes 12 MB with
- * diagonal faces, 21 MB with centres; and how many triangles may come twice for that. Several ranks would wait for each other
- * in every round, by a tenth and more of the whole: they have one. */
-enum { RM_ROUND_TRIANGLES = 80000 };
-#define RM_ROUND_REPEATS 0.5
+/* What a rank overlays at once at most: about 3300 hexahedra of either mesh, for which the overlay takes 12 MB with diagonal
+ * faces, 21 MB with centres; and how many triangles may come twice for that. Pairs that go home at once, at least: of 200 bytes
+ * while they do. */
+enum { RM_BLOCK_TRIANGLES = 80000, RM_SLICE_PAIRS = 20000 };
+#define RM_BLOCK_REPEATS 0.5
 
 /* Calls that all ranks make together, or among neighbours. */
 typedef enum rm_call {
@@ -46,6 +48,7 @@ struct remap_context {
   rm_parley     few, parley; /* that calls begin with; few: of ranks in the tree only, parley: of neighbours too */
   remap_options options;
   rm_slicing    slicing;  /* of overlays that keep nothing for the next one */
+  int64_t       slice;    /* pairs of a rank that go home at once, at least */
   remap_mesh   *block[2]; /* [side][num_blocks] as lent; malloc'ed */
   int64_t       block_room[2];
   int           num_blocks[2];
@@ -126,13 +129,13 @@ remap_status rm_context_join_blocks(rm_arena *arena, rm_arena *passing, int side
  * all. Collective. What is not kept lives in passing. */
 remap_status rm_context_read_meshes(remap_context *ctx, bool is_new[2], rm_arena *passing, rm_reason *reason);
 
-/* Choose where the cells of both meshes are overlaid, in how many rounds (rm_part_rounds), one if the place is to be kept; if
- * it is one, bring them there, unless they are there already: is_new[side], the mesh is not as it was at the last call.
+/* Choose where the cells of both meshes are overlaid, in how many blocks of a rank (rm_part_blocks), one if the place is to be
+ * kept, and bring them there, unless they are there already: is_new[side], the mesh is not as it was at the last call.
  * Collective. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_reason *reason);
 
-/* Bring the cells of a round there, if there are several, in place of those of the last. Collective. TOO_LARGE, NO_MEMORY. */
-remap_status rm_context_place_round(remap_context *ctx, int round, rm_reason *reason);
+/* Take a block's cells, in place of those of the last, unless the place is kept. Not collective. TOO_LARGE, NO_MEMORY. */
+remap_status rm_context_take_block(remap_context *ctx, int block, rm_reason *reason);
 
 /* Triangulate what is there of one side, unless that is done already. Not collective. TOO_LARGE, NO_MEMORY. */
 remap_status rm_context_triangulate(remap_context *ctx, int side);

@@ -9,7 +9,8 @@
  * reduction tells. More source cells than are needed change no result. The margin follows the pace of the motion and is 0 for a
  * build, or where cells move by much of their size at once.
  *
- * A build keeps nothing, and may overlay a rank's cells in rounds, piece by piece; moves overlay them in one.
+ * A build keeps nothing, and overlays a rank's cells block by block, each a piece that is taken from the rank's stocks; moves
+ * overlay them in one block, and keep the piece instead of the stock.
  *
  * O(n) time for what is made anew, besides two numbers per cell that moved; kept are 48 bytes per cell, and pieces and
  * triangles. */
@@ -33,6 +34,7 @@ void rm_context_drop_place(remap_context *ctx)
   for (int side = 0; side < 2; side++) {
     rm_context_drop_triangles(ctx, side);
     rm_arena_drop(ctx->place.piece_arena[side]);
+    rm_arena_drop(ctx->place.stock_arena[side]);
   }
   memset(&ctx->place, 0, sizeof ctx->place);
 }
@@ -138,17 +140,40 @@ static remap_status try_routes(remap_context *ctx, bool *hold, double *margin)
   return REMAP_OK;
 }
 
-/* A mesh's cells along the routes of a round. Collective. */
-static remap_status send_piece(remap_context *ctx, int side, int round, rm_reason *reason)
+/* A mesh's cells along the routes. Collective. */
+static remap_status send_stock(remap_context *ctx, int side, rm_reason *reason)
 {
   rm_place *place = &ctx->place;
 
+  rm_arena_drop(place->stock_arena[side]);
+  place->stock_arena[side] = rm_arena_new();
+  RM_TRY(rm_comm_agree(&ctx->comm, place->stock_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  return rm_part_send(place->stock_arena[side], &ctx->comm, ctx->mesh[side], place->routes, &place->stock[side], reason);
+}
+
+/* One side's piece of a block. Not collective. */
+static remap_status take_piece(remap_context *ctx, int side, int block, rm_reason *reason)
+{
+  rm_place *place = &ctx->place;
+
+  rm_context_drop_triangles(ctx, side);
   rm_arena_drop(place->piece_arena[side]);
   place->piece_arena[side] = rm_arena_new();
-  rm_context_drop_triangles(ctx, side);
-  RM_TRY(rm_comm_agree(&ctx->comm, place->piece_arena[side] ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  return rm_part_send(place->piece_arena[side], &ctx->comm, ctx->mesh[side], place->routes, round, &place->part.piece[side],
-                      reason);
+  if (!place->piece_arena[side]) return REMAP_NO_MEMORY;
+  return rm_part_take(place->piece_arena[side], place->routes, place->stock[side], block, &place->part.piece[side], reason);
+}
+
+/* What is to be kept of a mesh: its piece, in one block. Collective. */
+static remap_status keep_piece(remap_context *ctx, int side, rm_reason *reason)
+{
+  remap_status status;
+
+  RM_ASSERT(rm_part_blocks(ctx->place.routes) == 1);
+  status = rm_comm_agree_reason(&ctx->comm, take_piece(ctx, side, 0, reason), reason);
+  rm_arena_drop(ctx->place.stock_arena[side]);
+  ctx->place.stock_arena[side] = NULL;
+  ctx->place.stock[side]       = NULL;
+  return status;
 }
 
 remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool keeps, rm_reason *reason)
@@ -162,16 +187,18 @@ remap_status rm_context_place(remap_context *ctx, const bool is_new[2], bool kee
     ctx->place.frame = ctx->frame;
     for (int side = 0; side < 2; side++) rm_context_drop_triangles(ctx, side);
   }
-  for (int side = 0; side < 2; side++)
-    if ((!hold || is_new[side]) && rm_part_rounds(ctx->place.routes) == 1) RM_TRY(send_piece(ctx, side, 0, reason));
-  RM_ASSERT(rm_part_rounds(ctx->place.routes) > 1 || rm_part_check(&ctx->place.part) != REMAP_INTERNAL);
+  for (int side = 0; side < 2; side++) {
+    if (hold && !is_new[side]) continue;
+    RM_TRY(send_stock(ctx, side, reason));
+    if (keeps) RM_TRY(keep_piece(ctx, side, reason));
+  }
   return REMAP_OK;
 }
 
-remap_status rm_context_place_round(remap_context *ctx, int round, rm_reason *reason)
+remap_status rm_context_take_block(remap_context *ctx, int block, rm_reason *reason)
 {
-  if (rm_part_rounds(ctx->place.routes) == 1) return REMAP_OK;
-  for (int side = 0; side < 2; side++) RM_TRY(send_piece(ctx, side, round, reason));
+  for (int side = 0; side < 2; side++)
+    if (ctx->place.stock[side]) RM_TRY(take_piece(ctx, side, block, reason));
   RM_ASSERT(rm_part_check(&ctx->place.part) != REMAP_INTERNAL);
   return REMAP_OK;
 }

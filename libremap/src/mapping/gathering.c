@@ -1,18 +1,23 @@
-/* gathering -- pairs go home, round after round.
+/* gathering -- pairs wait where they were made until all are there, and go home in slices: the last ones first, so that what
+ * they took can be given back at once.
  *
  *   overlay rank              home of the receiving cell
  *   (i, j, V, M)   ----->     j, i, V, M                      serves source to target
  *        \------------->      i, j, which pair of j           serves target to source, if j has the same home
- *                             i, j, V, M about c_j            else
+ *                             i, j, V, M                      else
  *
- * A pair travels as a link of 20 bytes, and 32 bytes that it holds. At home it takes 40 bytes, its reverse 12, and 32 more
- * where it is away; what is known of the givers is fetched once per giver, when all pairs are there. O(pairs) time. */
+ * Where it was made a pair takes 41 bytes, and 8 for each of its cells in each block. It travels as a link of 20 bytes, and 32
+ * bytes that it holds. At home it takes 40 bytes, its reverse 12, and 32 more where it is away; what is known of the givers is
+ * fetched once per giver, when all pairs are there. O(pairs) time. */
 #include "mapping_private.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { SLACK = 32 }; /* growing arrays have so much of their length to spare */
+enum {
+  SLACK  = 32, /* growing arrays have so much of their length to spare                    */
+  SLICES = 16  /* in which pairs go home, at most: what is under way is kept several times */
+};
 
 enum {
   IS_CUT   = 1, /* the skin of the giving mesh passes through the receiver */
@@ -26,7 +31,7 @@ typedef struct link {
   rm_lid  twin; /* place among what the pairs hold that go to the same rank the other way, -1: this pair's own goes with it */
 } link;
 
-/* Volume, and moments about the giver's centroid. */
+/* Volume, and moments about the source cell's centroid. */
 typedef struct held {
   double volume, moment[3];
 } held;
@@ -41,78 +46,83 @@ typedef struct mail {
 
 /* ---- out --------------------------------------------------------------------------------------------------------- */
 
-/* One side's share in a pair of a part. */
+/* What is made ready for one slice: pairs from first on; what they say to one side's cells. */
 typedef struct ends {
-  remap_side      receiving;
-  const rm_piece *to, *from;
-  const rm_lid   *receiver, *giver;
-  const double  (*second)[6];
-  int             skin;
+  remap_side            receiving;
+  const rm_pairs_here  *p;
+  int64_t               first;
+  const rm_home        *to, *from;
+  const rm_lid         *receiver, *giver;
+  const double        (*second)[6];
+  int                   skin;
 } ends;
 
-static ends ends_of(const rm_part *part, const rm_moments *m, remap_side receiving)
+static ends ends_of(const rm_pairs_here *p, int64_t first, remap_side receiving)
 {
-  if (receiving == REMAP_TARGET)
-    return (ends){receiving, &part->piece[1], &part->piece[0], m->target, m->source, m->second, RM_PAIR_SOURCE_SKIN};
-  return (ends){receiving, &part->piece[0], &part->piece[1], m->source, m->target, m->second_back, RM_PAIR_TARGET_SKIN};
+  const int      to     = (int)receiving, from = 1 - to;
+  const double (*second)[6] = (const double(*)[6])(receiving == REMAP_TARGET ? p->second : p->second_back);
+
+  return (ends){.receiving = receiving,
+                .p         = p,
+                .first     = first,
+                .to        = p->home[to],
+                .from      = p->home[from],
+                .receiver  = p->cell[to],
+                .giver     = p->cell[from],
+                .second    = second,
+                .skin      = receiving == REMAP_TARGET ? RM_PAIR_SOURCE_SKIN : RM_PAIR_TARGET_SKIN};
 }
 
 /* Does what pair k holds go with it? */
-static bool goes_along(const ends *e, const rm_moments *m, int64_t k)
+static bool goes_along(const ends *e, int64_t k)
 {
-  if (m->flags[k] & RM_PAIR_EMPTY) return false;
-  return e->receiving == REMAP_TARGET || e->to->cell_home_rank[e->receiver[k]] != e->from->cell_home_rank[e->giver[k]];
+  if (e->p->flags[k] & RM_PAIR_EMPTY) return false;
+  return e->receiving == REMAP_TARGET || e->to[e->receiver[k]].rank != e->from[e->giver[k]].rank;
 }
 
-static remap_status new_mail(rm_arena *scratch, const rm_comm *comm, const ends *e, const rm_moments *m, mail *out)
+static remap_status new_mail(rm_arena *scratch, const rm_comm *comm, const ends *e, mail *out)
 {
   RM_NEW0(out->link_offset, scratch, (int64_t)comm->size + 1);
   RM_NEW0(out->held_offset, scratch, (int64_t)comm->size + 1);
-  for (int64_t k = 0; k < m->num_pairs; k++) {
-    const int home = e->to->cell_home_rank[e->receiver[k]];
+  for (int64_t k = e->first; k < e->p->num; k++) {
+    const int home = e->to[e->receiver[k]].rank;
 
     out->link_offset[home]++;
-    out->held_offset[home] += goes_along(e, m, k);
+    out->held_offset[home] += goes_along(e, k);
   }
   RM_NEW(out->link, scratch, rm_offsets(out->link_offset, comm->size));
   RM_NEW(out->held, scratch, rm_offsets(out->held_offset, comm->size));
   out->second = NULL;
-  if (e->second) RM_NEW(out->second, scratch, m->num_pairs);
+  if (e->second) RM_NEW(out->second, scratch, e->p->num - e->first);
   return REMAP_OK;
 }
 
-/* What pair k holds for its receiver. */
-static held hold(const ends *e, const rm_moments *m, int64_t k)
-{
-  const double *own = e->to->cell_centroid[e->receiver[k]], *other = e->from->cell_centroid[e->giver[k]];
-  held          h   = {.volume = m->volume[k]};
-
-  for (int d = 0; d < 3; d++) /* backward the receiver is the source cell, about whose centroid M is given */
-    h.moment[d] = m->moment[k][d] + (e->receiving == REMAP_SOURCE ? (own[d] - other[d]) * h.volume : 0.0);
-  return h;
-}
-
-/* The pairs of a part, by the home of the receiving cell. place [num_pairs] is where a pair's volume stands among what goes to
+/* The pairs of a slice, by the home of the receiving cell. place [pairs] is where a pair's volume stands among what goes to
  * the home of its target cell: written on the way to targets, read on the way to sources. */
-static remap_status pack(rm_arena *scratch, const rm_comm *comm, const ends *e, const rm_moments *m, rm_lid *place, mail *out)
+static remap_status pack(rm_arena *scratch, const rm_comm *comm, const ends *e, rm_lid *place, mail *out)
 {
-  int64_t *next_link, *next_held;
+  const rm_pairs_here *p = e->p;
+  int64_t             *next_link, *next_held;
 
-  RM_TRY(new_mail(scratch, comm, e, m, out));
+  RM_TRY(new_mail(scratch, comm, e, out));
   RM_NEW(next_link, scratch, comm->size);
   RM_NEW(next_held, scratch, comm->size);
   for (int r = 0; r < comm->size; r++) next_link[r] = out->link_offset[r], next_held[r] = out->held_offset[r];
-  for (int64_t k = 0; k < m->num_pairs; k++) {
-    const rm_lid  j = e->receiver[k], i = e->giver[k];
-    const int     home = e->to->cell_home_rank[j];
-    const int64_t at = next_link[home]++;
-    const int     what = (m->flags[k] & e->skin ? IS_CUT : 0) | (m->flags[k] & RM_PAIR_EMPTY ? IS_EMPTY : 0);
-    const bool    goes = goes_along(e, m, k);
+  for (int64_t k = e->first; k < p->num; k++) {
+    const rm_home to = e->to[e->receiver[k]], from = e->from[e->giver[k]];
+    const int64_t at   = next_link[to.rank]++;
+    const int     what = (p->flags[k] & e->skin ? IS_CUT : 0) | (p->flags[k] & RM_PAIR_EMPTY ? IS_EMPTY : 0);
+    const bool    goes = goes_along(e, k);
+    held         *h    = out->held + next_held[to.rank];
 
-    if (e->receiving == REMAP_TARGET) place[k] = (rm_lid)(next_held[home] - out->held_offset[home]);
-    out->link[at] = (link){e->to->cell_home[j], e->from->cell_home[i], e->from->cell_home_rank[i], what, goes ? -1 : place[k]};
-    if (goes) out->held[next_held[home]++] = hold(e, m, k);
-    for (int d = 0; d < 6 && e->second; d++) out->second[at][d] = e->second[k][d];
+    if (e->receiving == REMAP_TARGET) place[k - e->first] = (rm_lid)(next_held[to.rank] - out->held_offset[to.rank]);
+    out->link[at] = (link){to.cell, from.cell, from.rank, what, goes ? -1 : place[k - e->first]};
+    if (goes) {
+      h->volume = p->volume[k];
+      memcpy(h->moment, p->moment[k], sizeof h->moment);
+      next_held[to.rank]++;
+    }
+    if (e->second) memcpy(out->second[at], e->second[k], sizeof *out->second);
   }
   return REMAP_OK;
 }
@@ -246,48 +256,148 @@ static remap_status take_all(rm_gathering *g, const rm_comm *comm, remap_side si
 
 /* ------------------------------------------------------------------------------------------------------------------ */
 
-/* The pairs of one side's cells. Collective. */
-static remap_status bring_home(rm_gathering *g, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                               remap_side side, rm_lid *place, int64_t *first, rm_reason *reason)
+/* What a slice says to one side's cells. Collective. */
+static remap_status bring_home(rm_gathering *g, const rm_comm *comm, const ends *e, rm_lid *place, int64_t *first,
+                               rm_reason *reason)
 {
-  const ends   e     = ends_of(part, moments, side);
   rm_arena    *going = rm_arena_new(), *coming = rm_arena_new();
   mail         out = {0}, in = {0};
-  remap_status status = going && coming ? pack(going, comm, &e, moments, place, &out) : REMAP_NO_MEMORY;
+  remap_status status = going && coming ? pack(going, comm, e, place, &out) : REMAP_NO_MEMORY;
 
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
   RM_GOTO(done, status = deliver(coming, comm, &out, g->has_second, &in));
   rm_arena_drop(going);
   going  = NULL;
-  status = rm_comm_agree_reason(comm, take_all(g, comm, side, &in, first, reason), reason);
+  status = rm_comm_agree_reason(comm, take_all(g, comm, e->receiving, &in, first, reason), reason);
 done:
   rm_arena_drop(going);
   rm_arena_drop(coming);
   return status;
 }
 
-remap_status rm_mapping_add(rm_gathering *g, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                            rm_reason *reason)
+/* The last num of the pairs that are here. Collective. */
+static remap_status send_slice(rm_gathering *g, const rm_comm *comm, int64_t num, rm_reason *reason)
 {
-  rm_arena    *scratch = rm_arena_new();
-  int64_t     *first   = scratch ? rm_arena_alloc(scratch, comm->size, sizeof *first) : NULL;
-  rm_lid      *place   = scratch ? rm_arena_alloc(scratch, moments->num_pairs, sizeof *place) : NULL;
-  remap_status status  = first && place ? REMAP_OK : REMAP_NO_MEMORY;
+  static const remap_side order[2] = {REMAP_TARGET, REMAP_SOURCE};
+  const int64_t           from     = g->here.num - num;
+  rm_arena               *scratch  = rm_arena_new();
+  int64_t                *first    = scratch ? rm_arena_alloc(scratch, comm->size, sizeof *first) : NULL;
+  rm_lid                 *place    = scratch ? rm_arena_alloc(scratch, num, sizeof *place) : NULL;
+  remap_status            status   = rm_comm_agree(comm, first && place ? REMAP_OK : REMAP_NO_MEMORY, NULL);
 
-  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = bring_home(g, comm, part, moments, REMAP_TARGET, place, first, reason));
-  status = bring_home(g, comm, part, moments, REMAP_SOURCE, place, first, reason);
-done:
+  for (int k = 0; k < 2 && status == REMAP_OK; k++) {
+    const ends e = ends_of(&g->here, from, order[k]);
+
+    status = bring_home(g, comm, &e, place, first, reason);
+  }
   rm_arena_drop(scratch);
   return status;
 }
 
-rm_gathering *rm_mapping_open(const rm_mesh *const mesh[2], bool has_second)
+/* ---- here -------------------------------------------------------------------------------------------------------- */
+
+static void forget_pairs(rm_pairs_here *p)
+{
+  void *all[9] = {p->cell[0], p->cell[1], p->home[0], p->home[1], p->volume, p->moment, p->second, p->second_back, p->flags};
+
+  for (int k = 0; k < 9; k++) free(all[k]);
+  memset(p, 0, sizeof *p);
+}
+
+/* Cut an array off behind n elements. It stays as it is if there is no memory to do that with. */
+static void cut_off(void *data, int64_t n, size_t size)
+{
+  void *array, *shorter;
+
+  memcpy(&array, data, sizeof array); /* data points to a pointer of some type */
+  shorter = array && n > 0 ? realloc(array, (size_t)n * size) : NULL;
+  if (shorter) memcpy(data, &shorter, sizeof shorter);
+}
+
+/* Give back what the last num pairs took, and everything with the last one. */
+static void forget_slice(rm_pairs_here *p, int64_t num)
+{
+  p->num -= num;
+  if (p->num == 0) {
+    forget_pairs(p);
+    return;
+  }
+  for (int side = 0; side < 2; side++) cut_off(&p->cell[side], p->num, sizeof *p->cell[side]);
+  cut_off(&p->volume, p->num, sizeof *p->volume);
+  cut_off(&p->moment, p->num, sizeof *p->moment);
+  cut_off(&p->second, p->num, sizeof *p->second);
+  cut_off(&p->second_back, p->num, sizeof *p->second_back);
+  cut_off(&p->flags, p->num, sizeof *p->flags);
+}
+
+remap_status rm_gathering_send(rm_gathering *g, const rm_comm *comm, rm_reason *reason)
+{
+  const int64_t most = (g->here.num + SLICES - 1) / SLICES, size = most > g->slice ? most : g->slice;
+  int64_t       num_slices = (g->here.num + size - 1) / size;
+
+  RM_TRY(rm_comm_max_i64(comm, &num_slices, 1));
+  for (int64_t s = 0; s < num_slices; s++) {
+    const int64_t num = g->here.num < size ? g->here.num : size;
+
+    RM_TRY(send_slice(g, comm, num, reason));
+    forget_slice(&g->here, num);
+  }
+  return REMAP_OK;
+}
+
+static remap_status reserve_here(rm_pairs_here *p, const rm_part *part, const rm_moments *m)
+{
+  const int64_t need = p->num + m->num_pairs;
+
+  for (int side = 0; side < 2; side++) {
+    const int64_t homes = p->num_homes[side] + part->piece[side].num_cells;
+
+    RM_REQUIRE(homes <= INT32_MAX, REMAP_TOO_LARGE);
+    RM_TRY(reserve(&p->home[side], p->home_room[side], homes, sizeof *p->home[side]));
+    if (homes > p->home_room[side]) p->home_room[side] = homes + homes / SLACK;
+    RM_TRY(reserve(&p->cell[side], p->room, need, sizeof *p->cell[side]));
+  }
+  RM_TRY(reserve(&p->volume, p->room, need, sizeof *p->volume));
+  RM_TRY(reserve(&p->moment, p->room, need, sizeof *p->moment));
+  if (m->second) RM_TRY(reserve(&p->second, p->room, need, sizeof *p->second));
+  if (m->second) RM_TRY(reserve(&p->second_back, p->room, need, sizeof *p->second_back));
+  RM_TRY(reserve(&p->flags, p->room, need, sizeof *p->flags));
+  if (need > p->room) p->room = need + need / SLACK;
+  return REMAP_OK;
+}
+
+remap_status rm_mapping_add(rm_gathering *g, const rm_part *part, const rm_moments *m)
+{
+  rm_pairs_here      *p       = &g->here;
+  const rm_lid *const cell[2] = {m->source, m->target};
+  const size_t        num     = (size_t)m->num_pairs;
+
+  RM_TRY(reserve_here(p, part, m));
+  if (num == 0) return REMAP_OK;
+  for (int side = 0; side < 2; side++) {
+    const rm_piece *piece = &part->piece[side];
+    const rm_lid    first = (rm_lid)p->num_homes[side];
+
+    for (rm_lid c = 0; c < piece->num_cells; c++)
+      p->home[side][p->num_homes[side]++] = (rm_home){piece->cell_home_rank[c], piece->cell_home[c]};
+    for (size_t k = 0; k < num; k++) p->cell[side][(size_t)p->num + k] = first + cell[side][k];
+  }
+  memcpy(p->volume + p->num, m->volume, num * sizeof *p->volume);
+  memcpy(p->moment + p->num, m->moment, num * sizeof *p->moment);
+  if (m->second) memcpy(p->second + p->num, m->second, num * sizeof *p->second);
+  if (m->second) memcpy(p->second_back + p->num, m->second_back, num * sizeof *p->second_back);
+  memcpy(p->flags + p->num, m->flags, num);
+  p->num += m->num_pairs;
+  return REMAP_OK;
+}
+
+rm_gathering *rm_mapping_open(const rm_mesh *const mesh[2], bool has_second, int64_t slice)
 {
   rm_gathering *g = calloc(1, sizeof *g);
 
   for (int side = 0; side < 2 && g; side++) {
     g->has_second      = has_second;
+    g->slice           = slice > 0 ? slice : 1;
     g->of[side].is_cut = calloc((size_t)mesh[side]->num_cells + 1, 1);
     if (g->of[side].is_cut) continue;
     rm_gathering_drop(g);
@@ -305,6 +415,7 @@ void rm_gathering_drop(rm_gathering *g)
     for (int k = 0; k < 7; k++) free(all[k]);
     rm_arrivals_forget_givers(a);
   }
+  if (g) forget_pairs(&g->here);
   free(g);
 }
 

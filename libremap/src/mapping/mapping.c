@@ -165,6 +165,18 @@ static remap_status keep_target(job *j, rm_arrivals *a, rows_draft *draft, const
   return REMAP_OK;
 }
 
+/* Moments of pairs that are away are about their source cell's centroid as they arrive; take them about the target cell's. */
+static void turn_away(const rm_mesh *sources, const rows_draft *draft, rm_arrivals *a)
+{
+  for (rm_lid c = 0; c < sources->num_cells; c++)
+    for (int64_t k = draft->offset[c]; k < draft->offset[c + 1]; k++) {
+      const double *own = sources->cell_centroid[c], *other = draft->giver_centroid[a->giver[k]];
+      const rm_lid  away = -1 - a->twin[k];
+
+      for (int d = 0; d < 3 && away >= 0; d++) a->moment[away][d] += (own[d] - other[d]) * a->volume[away];
+    }
+}
+
 static remap_status keep_source(job *j, rm_arrivals *a, rows_draft *draft, rm_rows *rows)
 {
   const double *of_target = j->draft[REMAP_TARGET].volume;
@@ -175,6 +187,7 @@ static remap_status keep_source(job *j, rm_arrivals *a, rows_draft *draft, rm_ro
     if (a->twin[k] >= 0) a->twin[k] = j->place_of[a->twin[k]];
     draft->volume[k] = a->twin[k] >= 0 ? of_target[a->twin[k]] : a->volume[-1 - a->twin[k]];
   }
+  turn_away(j->mesh[REMAP_SOURCE], draft, a);
   RM_TRY(keep(j->arena, &a->twin, a->num, sizeof *a->twin, &rows->twin));
   RM_TRY(keep(j->arena, &a->volume, a->num_held, sizeof *a->volume, &rows->away_volume));
   return keep(j->arena, &a->moment, a->num_held, sizeof *a->moment, &rows->away_moment);
@@ -427,7 +440,7 @@ static remap_status close_both(job *j, rm_gathering *g)
 }
 
 remap_status rm_mapping_close(rm_arena *arena, rm_gathering *g, const rm_comm *comm, const rm_frame *frame,
-                              const rm_mesh *const mesh[2], const rm_mapping **out)
+                              const rm_mesh *const mesh[2], const rm_mapping **out, rm_reason *reason)
 {
   job          j      = {.arena = arena, .passing = rm_arena_new(), .comm = comm, .frame = frame, .mesh = mesh};
   remap_status status = REMAP_NO_MEMORY;
@@ -435,6 +448,7 @@ remap_status rm_mapping_close(rm_arena *arena, rm_gathering *g, const rm_comm *c
   j.mapping = rm_arena_zero(arena, 1, sizeof *j.mapping);
   if (j.mapping && j.passing) status = REMAP_OK;
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = rm_gathering_send(g, comm, reason));
   RM_GOTO(done, status = close_both(&j, g));
   RM_ASSERT(rm_mapping_check(j.mapping, mesh) != REMAP_INTERNAL);
   *out = j.mapping;
@@ -468,13 +482,14 @@ remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], 
 remap_status rm_mapping_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                               const rm_part *part, const rm_moments *moments, const rm_mapping **out, rm_reason *reason)
 {
-  rm_gathering     *g      = rm_mapping_open(mesh, moments->second != NULL);
+  rm_gathering     *g = rm_mapping_open(mesh, moments->second != NULL, 1);
   const rm_mapping *short_of_sources;
-  remap_status      status = rm_comm_agree(comm, g ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+  remap_status      status = g ? rm_mapping_add(g, part, moments) : REMAP_NO_MEMORY;
 
-  if (status == REMAP_OK) status = rm_mapping_add(g, comm, part, moments, reason);
-  if (status == REMAP_OK) status = rm_mapping_close(arena, g, comm, frame, mesh, &short_of_sources);
-  if (status == REMAP_OK) status = rm_comm_agree(comm, rm_mapping_complete(arena, mesh, short_of_sources, out), NULL);
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  RM_GOTO(done, status = rm_mapping_close(arena, g, comm, frame, mesh, &short_of_sources, reason));
+  status = rm_comm_agree(comm, rm_mapping_complete(arena, mesh, short_of_sources, out), NULL);
+done:
   rm_gathering_drop(g);
   return status;
 }

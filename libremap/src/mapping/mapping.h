@@ -49,21 +49,21 @@ typedef struct rm_mapping {
   rm_gid  worst_closure_cell[2];     /* its global id (the smallest such), -1 if none     */
 } rm_mapping;
 
-/* Pairs on their way home. */
+/* Pairs where they were made, and on their way home. */
 typedef struct rm_gathering rm_gathering;
-/* Without pairs yet; with second moments or without. The caller owns it: rm_gathering_drop. NULL if memory is out. Not
- * collective. */
-rm_gathering *rm_mapping_open(const rm_mesh *const mesh[2], bool has_second);
+/* Without pairs yet; with second moments or without. slice: so many pairs of a rank go home at once, or a 16th if that is more.
+ * The caller owns it: rm_gathering_drop. NULL if memory is out. Not collective. */
+rm_gathering *rm_mapping_open(const rm_mesh *const mesh[2], bool has_second, int64_t slice);
 void rm_gathering_drop(rm_gathering *gathering);
-/* Send the pairs of a part home; part and moments may end then. Every pair is added once, by whichever rank and in whichever
- * call. Collective. TOO_LARGE if 2^31 or more come to one rank. */
-remap_status rm_mapping_add(rm_gathering *gathering, const rm_comm *comm, const rm_part *part, const rm_moments *moments,
-                            rm_reason *reason);
-/* Rows of all pairs that were added, which the gathering then has no longer; those of source cells without volume and moment.
- * Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs says SOURCE_SKIN and the
- * pairs leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. */
+/* Add the pairs of a part; part and moments may end then. Every pair is added once, by whichever rank and in whichever call.
+ * Not collective. TOO_LARGE, NO_MEMORY. */
+remap_status rm_mapping_add(rm_gathering *gathering, const rm_part *part, const rm_moments *moments);
+/* Send all pairs that were added home and make rows of them; the gathering then has them no longer. Rows of source cells are
+ * without volume and moment. Collective. Lives in arena. A target cell is uncovered without pairs, partial if one of its pairs
+ * says SOURCE_SKIN and the pairs leave more of it than 2^-44, else covered; a source cell likewise by TARGET_SKIN. TOO_LARGE if
+ * 2^31 or more pairs come to one rank. */
 remap_status rm_mapping_close(rm_arena *arena, rm_gathering *gathering, const rm_comm *comm, const rm_frame *frame,
-                              const rm_mesh *const mesh[2], const rm_mapping **out);
+                              const rm_mesh *const mesh[2], const rm_mapping **out, rm_reason *reason);
 /* The same mapping with volume and moment of the source cells' rows too, 32 bytes per pair. Not collective. Lives in arena and
  * borrows from mapping. O(pairs). NO_MEMORY. */
 remap_status rm_mapping_complete(rm_arena *arena, const rm_mesh *const mesh[2], const rm_mapping *mapping,

@@ -23,10 +23,33 @@ typedef struct rm_arrivals {
   int64_t  num_buckets;
 } rm_arrivals;
 
+/* Where a cell's home is, and its number there. */
+typedef struct rm_home {
+  int32_t rank;
+  rm_lid  cell;
+} rm_home;
+
+/* The pairs that were made on this rank. Arrays are malloc'ed. A cell is listed once for every part that it came with. */
+typedef struct rm_pairs_here {
+  int64_t  num, room;
+  rm_lid  *cell[2];        /* [side][num] place in the list of homes          */
+  double  *volume;         /* [num] and so on, as in rm_moments               */
+  double (*moment)[3], (*second)[6], (*second_back)[6];
+  uint8_t *flags;
+  int64_t  num_homes[2], home_room[2];
+  rm_home *home[2];        /* [side][num_homes]                               */
+} rm_pairs_here;
+
 struct rm_gathering {
-  bool        has_second;
-  rm_arrivals of[2]; /* [side that receives] */
+  bool          has_second;
+  int64_t       slice; /* pairs that go home at once, at least */
+  rm_pairs_here here;
+  rm_arrivals   of[2]; /* [side that receives] */
 };
+
+/* Send the pairs that are here home; none is here then. Moments of pairs that are away from their target cells are still about
+ * the source cells' centroids. Collective. TOO_LARGE if 2^31 or more come to one rank. */
+remap_status rm_gathering_send(rm_gathering *g, const rm_comm *comm, rm_reason *reason);
 
 /* Give the list of givers back; pairs keep their numbers. */
 void rm_arrivals_forget_givers(rm_arrivals *a);

@@ -1,4 +1,4 @@
-/* match -- which cells each rank needs in each round, and so which cells each home sends. Pairs are made
+/* match -- which cells each rank needs in each of its blocks, and so which cells each home sends. Pairs are made
  *
  *     source   target      at
  *     any      small       the seat of the target
@@ -24,7 +24,7 @@ typedef struct list {
   rm_keyed *want; /* malloc'ed */
 } list;
 
-/* What one round overlays. */
+/* What is overlaid at once. */
 typedef struct block {
   rm_lid            num_small;    /* targets seated here that are no giants */
   const double    (*small)[6];    /* their boxes                            */
@@ -266,65 +266,119 @@ static remap_status choose_blocks(here *h, const rm_slicing *slicing)
   }
 }
 
-/* Sort one side's wants by home and number there, and part them into what to ask whom and what it is. Not collective. */
-static remap_status sort_wants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, list *l, int64_t *offset, rm_lid **cell,
-                               uint8_t **role)
-{
-  rm_keyed *spare;
+/* ---- lists -------------------------------------------------------------------------------------------------------- */
 
-  RM_REQUIRE(l->num <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_NEW(spare, scratch, l->num);
-  RM_NEW(*cell, scratch, l->num);
-  RM_NEW(*role, arena, l->num);
-  rm_sort_keyed(l->want, spare, l->num);
-  for (int r = 0; r <= comm->size; r++) offset[r] = 0;
-  for (int64_t k = 0; k < l->num; k++) {
-    offset[l->want[k].key >> 32]++;
-    (*cell)[k] = (rm_lid)(l->want[k].key & INT32_MAX);
-    (*role)[k] = (uint8_t)l->want[k].item;
+/* The wants of one side, block after block. */
+typedef struct wants {
+  int64_t  *offset; /* [blocks + 1]                                                          */
+  rm_lid   *cell;   /* [offset[blocks]] number at its home, of other homes' cells among those that come here in the end */
+  uint8_t  *role;   /* [offset[blocks]]                                                      */
+  rm_keyed *spare;  /* [most of one block] */
+  rm_keyed *away;   /* [num_away] those of other homes: key as in a list, item the place     */
+  int64_t   num_away;
+  int64_t  *asked_offset; /* [comm->size + 1] */
+  rm_lid   *asked;        /* [asked_offset[comm->size]] what others are asked for, by home and number there, each once */
+} wants;
+
+static remap_status new_wants(rm_arena *arena, rm_arena *scratch, const here *h, int side, wants *out)
+{
+  int64_t num = 0, most = 0;
+
+  RM_NEW(out->offset, scratch, (int64_t)h->inner.num + 2);
+  for (int b = 0; b <= h->inner.num; b++) {
+    const list *l = &h->block[b].wants[side];
+
+    RM_REQUIRE(l->num <= INT32_MAX, REMAP_TOO_LARGE);
+    out->offset[b] = num;
+    num += l->num;
+    most = l->num > most ? l->num : most;
+    for (int64_t k = 0; k < l->num; k++) out->num_away += (int64_t)(l->want[k].key >> 32) != h->comm->rank;
   }
-  rm_offsets(offset, comm->size);
+  out->offset[h->inner.num + 1] = num;
+  RM_NEW(out->cell, arena, num);
+  RM_NEW(out->role, arena, num);
+  RM_NEW(out->spare, scratch, most);
+  RM_NEW(out->away, scratch, out->num_away);
+  out->num_away = 0;
   return REMAP_OK;
 }
 
-/* Ask the homes of one side for the cells on a list. Collective. */
-static remap_status ask(rm_arena *arena, const rm_comm *comm, list *l, int side, rm_round *out)
+/* A block's wants in order, as its list; what others have is noted as away. */
+static remap_status fill_list(rm_arena *arena, const here *h, int side, int b, wants *w, rm_block *out)
 {
-  rm_arena    *scratch = rm_arena_new();
-  int64_t     *offset  = scratch ? rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset) : NULL;
-  rm_lid      *cell    = NULL;
-  rm_route    *route   = &out->of[side];
-  void        *asked;
-  remap_status status;
+  const list *l = &h->block[b].wants[side];
 
-  route->offset = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *route->offset);
-  status = offset && route->offset ? sort_wants(arena, scratch, comm, l, offset, &cell, &out->role[side]) : REMAP_NO_MEMORY;
+  RM_NEW0(out->list[side].offset, arena, RM_SHARES + 1);
+  out->list[side].cell = w->cell + w->offset[b];
+  out->role[side]      = w->role + w->offset[b];
+  rm_sort_keyed(l->want, w->spare, l->num);
+  for (int64_t k = 0; k < l->num; k++) {
+    const int home  = (int)(l->want[k].key >> 32), rank = h->comm->rank;
+    const int share = home < rank ? RM_BEFORE : home > rank ? RM_BEHIND : RM_OWN;
+
+    out->list[side].offset[share]++;
+    out->list[side].cell[k] = (rm_lid)(l->want[k].key & INT32_MAX);
+    out->role[side][k]      = (uint8_t)l->want[k].item;
+    if (share != RM_OWN) w->away[w->num_away++] = (rm_keyed){l->want[k].key, w->offset[b] + k};
+  }
+  rm_offsets(out->list[side].offset, RM_SHARES);
+  return REMAP_OK;
+}
+
+/* Number what comes here as it will arrive, by home and number there, and list what to ask for. */
+static remap_status number_away(rm_arena *scratch, const here *h, wants *w)
+{
+  rm_keyed *spare;
+  int64_t   num = 0;
+
+  RM_NEW(spare, scratch, w->num_away);
+  RM_NEW(w->asked, scratch, w->num_away);
+  RM_NEW0(w->asked_offset, scratch, (int64_t)h->comm->size + 1);
+  rm_sort_keyed(w->away, spare, w->num_away);
+  for (int64_t k = 0; k < w->num_away; k++) {
+    const uint64_t key = w->away[k].key;
+
+    if (k == 0 || key != w->away[k - 1].key) {
+      w->asked_offset[key >> 32]++;
+      w->asked[num++] = (rm_lid)(key & INT32_MAX);
+    }
+    RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
+    w->cell[w->away[k].item] = (rm_lid)(num - 1);
+  }
+  rm_offsets(w->asked_offset, h->comm->size);
+  return REMAP_OK;
+}
+
+/* Not collective. */
+static remap_status list_blocks(rm_arena *arena, rm_arena *scratch, const here *h, int side, wants *w, rm_routes *out)
+{
+  RM_NEW(out->of[side].offset, arena, (int64_t)h->comm->size + 1);
+  RM_TRY(new_wants(arena, scratch, h, side, w));
+  for (int b = 0; b < out->num_blocks; b++) {
+    RM_TRY(fill_list(arena, h, side, b, w, &out->block[b]));
+    free(h->block[b].wants[side].want);
+    h->block[b].wants[side] = (list){0, 0, NULL};
+  }
+  return number_away(scratch, h, w);
+}
+
+/* What this rank's blocks need of one side, and what others need of this rank. Collective. */
+static remap_status ask(rm_arena *arena, const here *h, int side, rm_routes *out)
+{
+  const rm_comm *comm    = h->comm;
+  rm_arena      *scratch = rm_arena_new();
+  wants          w       = {0};
+  void          *asked;
+  remap_status   status = scratch && out->block ? list_blocks(arena, scratch, h, side, &w, out) : REMAP_NO_MEMORY;
+
   RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = rm_comm_exchange(comm, arena, sizeof *cell, offset, cell, route->offset, &asked));
-  route->cell    = asked;
-  out->num[side] = (rm_lid)l->num;
+  RM_ASSERT(w.asked_offset && w.asked);
+  out->num_came[side] = (rm_lid)w.asked_offset[comm->size];
+  RM_GOTO(done, status = rm_comm_exchange(comm, arena, sizeof *w.asked, w.asked_offset, w.asked, out->of[side].offset, &asked));
+  out->of[side].cell = asked;
 done:
   rm_arena_drop(scratch);
   return status;
-}
-
-/* Ask for all rounds. A rank with fewer blocks than others wants nothing in the last ones. Collective. */
-static remap_status ask_all(rm_arena *arena, here *h, rm_routes *out)
-{
-  const rm_comm *comm = h->comm;
-  int64_t        num  = h->inner.num + 1;
-  list           none[2] = {{0, 0, NULL}, {0, 0, NULL}};
-
-  RM_TRY(rm_comm_max_i64(comm, &num, 1));
-  out->num   = (int)num;
-  out->round = rm_arena_alloc(arena, num, sizeof *out->round);
-  RM_TRY(rm_comm_agree(comm, out->round ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  for (int r = 0; r < out->num; r++) {
-    list *wants = r <= h->inner.num ? h->block[r].wants : none;
-
-    for (int side = 0; side < 2; side++) RM_TRY(ask(arena, comm, &wants[side], side, &out->round[r]));
-  }
-  return REMAP_OK;
 }
 
 remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
@@ -335,7 +389,9 @@ remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *co
 
   RM_TRY(rm_part_receive_visitors(scratch, comm, tags, &h.visitors));
   RM_GOTO(done, status = rm_comm_agree(comm, choose_blocks(&h, slicing), NULL));
-  status = ask_all(arena, &h, out);
+  out->num_blocks = h.inner.num + 1;
+  out->block      = rm_arena_alloc(arena, out->num_blocks, sizeof *out->block);
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) status = ask(arena, &h, side, out);
 done:
   drop_blocks(&h);
   return status;

@@ -77,67 +77,38 @@ done:
   return status;
 }
 
-int rm_part_rounds(const rm_routes *routes) { return routes->num; }
+int rm_part_blocks(const rm_routes *routes) { return routes->num_blocks; }
 
-/* The cells of a side that go to a rank in any round, each once. Not collective. */
-static remap_status unite(rm_arena *arena, const rm_comm *comm, int side, const rm_routes *routes, rm_route *out)
+/* One block of both meshes; the stocks live in scratch. Collective. */
+static remap_status bring(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
+                          const rm_routes *routes, rm_part *part, rm_reason *reason)
 {
-  int64_t   most = 0, num = 0;
-  uint64_t *word;
+  remap_status    status = REMAP_OK;
+  const rm_stock *stock[2];
 
-  for (int r = 0; r < routes->num; r++) most += routes->round[r].of[side].offset[comm->size];
-  RM_NEW(out->offset, arena, (int64_t)comm->size + 1);
-  RM_NEW(out->cell, arena, most);
-  RM_NEW(word, arena, most);
-  out->offset[0] = 0;
-  for (int rank = 0; rank < comm->size; rank++) {
-    int64_t n = 0;
-
-    for (int r = 0; r < routes->num; r++) {
-      const rm_route *of = &routes->round[r].of[side];
-
-      for (int64_t k = of->offset[rank]; k < of->offset[rank + 1]; k++) word[n++] = (uint64_t)of->cell[k];
-    }
-    rm_sort_words(word, n);
-    for (int64_t k = 0; k < n; k++)
-      if (k == 0 || word[k] != word[k - 1]) out->cell[num++] = (rm_lid)word[k];
-    out->offset[rank + 1] = num;
-  }
-  return REMAP_OK;
-}
-
-remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, int round,
-                          rm_piece *out, rm_reason *reason)
-{
-  const int    side    = (int)mesh->side;
-  rm_arena    *scratch = rm_arena_new();
-  rm_route     all;
-  remap_status status = scratch ? REMAP_OK : REMAP_NO_MEMORY;
-
-  if (status == REMAP_OK && round == RM_EVERY_ROUND) status = unite(scratch, comm, side, routes, &all);
-  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
-  RM_GOTO(done, status = rm_part_ship(arena, scratch, comm, mesh,
-                                      round == RM_EVERY_ROUND ? &all : &routes->round[round].of[side], out, reason));
-  RM_ASSERT(round == RM_EVERY_ROUND || routes->round[round].num[side] == out->num_cells);
-  if (round != RM_EVERY_ROUND) out->cell_role = routes->round[round].role[side];
-done:
-  rm_arena_drop(scratch);
-  return status;
+  for (int side = 0; side < 2; side++) RM_TRY(rm_part_send(scratch, comm, mesh[side], routes, &stock[side], reason));
+  for (int side = 0; side < 2 && status == REMAP_OK; side++)
+    status = rm_part_take(arena, routes, stock[side], 0, &part->piece[side], reason);
+  return rm_comm_agree_reason(comm, status, reason);
 }
 
 remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, const rm_part **out, rm_reason *reason)
 {
-  rm_part         *part   = rm_arena_alloc(arena, 1, sizeof *part);
-  const rm_routes *routes = NULL;
+  rm_part         *part    = rm_arena_alloc(arena, 1, sizeof *part);
+  rm_arena        *scratch = rm_arena_new();
+  const rm_routes *routes  = NULL;
+  remap_status     status;
 
-  RM_TRY(rm_comm_agree(comm, part ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(part);
-  RM_TRY(rm_part_plan(arena, comm, frame, mesh, zone, &rm_one_block, &routes, reason));
-  for (int side = 0; side < 2; side++) RM_TRY(rm_part_send(arena, comm, mesh[side], routes, 0, &part->piece[side], reason));
+  RM_GOTO(done, status = rm_comm_agree(comm, part && scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(part && scratch);
+  RM_GOTO(done, status = rm_part_plan(arena, comm, frame, mesh, zone, &rm_one_block, &routes, reason));
+  RM_GOTO(done, status = bring(arena, scratch, comm, mesh, routes, part, reason));
   RM_ASSERT(rm_part_check(part) != REMAP_INTERNAL);
   *out = part;
-  return REMAP_OK;
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
 /* Every number is in its range, a skin face has one cell, and cells ascend by sender and the sender's numbering. */

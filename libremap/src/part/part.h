@@ -6,9 +6,9 @@
  * the seats of the cells it meets, and its pairs are made there. So every pair of cells is made on exactly one rank, and no
  * rank gets all cells of a mesh because of one cell of the other.
  *
- * A rank overlays its interval in one piece or in several rounds, a block of its interval in each, so that the memory of an
- * overlay need not grow with what a rank has: a block is to a rank's interval what that is to the whole, and pairs do not
- * depend on where they are made. */
+ * A rank overlays its interval in blocks, one after the other and without asking others, so that the memory of an overlay need
+ * not grow with what a rank has: a block is to a rank's interval what that is to the whole, and pairs do not depend on where
+ * they are made. What comes from other ranks comes once, and waits in the rank's stock. */
 #ifndef RM_PART_H
 #define RM_PART_H
 
@@ -62,25 +62,32 @@ typedef struct rm_slicing {
 } rm_slicing;
 extern const rm_slicing rm_one_block;
 
-/* Which cells go where in which round, and what they are there. Opaque; read-only once made. */
+/* Which cells go where, and which block of a rank needs which, as what. Opaque; read-only once made. */
 typedef struct rm_routes rm_routes;
+
+/* The cells of one mesh from which a rank takes those of its blocks: its own and what came. Opaque. */
+typedef struct rm_stock rm_stock;
 
 /* Choose where the cells of the zone go. Collective. Lives in arena. TOO_LARGE as below. */
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                           const rm_zone *zone, const rm_slicing *slicing, const rm_routes **out, rm_reason *reason);
 
-/* How many rounds there are: as many on every rank. Not collective. */
-int rm_part_rounds(const rm_routes *routes);
+/* How many blocks this rank has, at least 1. Not collective: others may have more or fewer. */
+int rm_part_blocks(const rm_routes *routes);
 
-/* Send the cells of one mesh there that are overlaid in a round, or in any of them, each once, if that is RM_EVERY_ROUND; then
- * they have no roles. Collective. The routes may have been made for the same cells in another position. *out lives in arena,
- * its roles with the routes. Cells come in ascending order of sender, then of the sender's numbering: later rooms must not let
- * results depend on it. TOO_LARGE if the piece has 2^31 or more entities. */
-enum { RM_EVERY_ROUND = -1 };
-remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes, int round,
-                          rm_piece *out, rm_reason *reason);
+/* Send the cells of one mesh to the ranks that need them, each once. Collective. The routes may have been made for the same
+ * cells in another position. *out lives in arena and borrows mesh. TOO_LARGE if 2^31 or more entities come to a rank. */
+remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes,
+                          const rm_stock **out, rm_reason *reason);
 
-/* Both in one, for both meshes, in one round. Collective. Lives in arena. */
+/* The cells of a block, or of any block, each once, if that is RM_EVERY_BLOCK; then they have no roles. Not collective, and not
+ * twice at once from one stock. *out lives in arena, its roles with the routes. Cells come in ascending order of the rank of
+ * their home, then of their number there: later rooms must not let results depend on it. TOO_LARGE, NO_MEMORY. */
+enum { RM_EVERY_BLOCK = -1 };
+remap_status rm_part_take(rm_arena *arena, const rm_routes *routes, const rm_stock *stock, int block, rm_piece *out,
+                          rm_reason *reason);
+
+/* All of it, for both meshes, in one block. Collective. Lives in arena. */
 remap_status rm_part_build(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, const rm_part **out, rm_reason *reason);
 /* Every invariant above; slow. Not collective. */

@@ -5,8 +5,8 @@
  *   crowd    coarse boxes tell every rank where the others' tags are
  *   giant    the cells that meet a large part of the other mesh are found, and known to all ranks
  *   weigh    estimates the work that each cell's pairs make; intervals of equal work are cut, and the tags move on
- *   match    every rank lists the cells it needs, and asks their homes for them
- *   ship     cells with their faces and nodes travel
+ *   match    every rank lists the cells its blocks need, and asks their homes for those of other ranks
+ *   ship     cells with their faces and nodes travel; those of a block are taken out of what is there
  *
  * The part of a supermesh (cover) is cut evenly and matched from the homes (touch).
  *
@@ -25,15 +25,21 @@ typedef struct rm_route {
   rm_lid  *cell;   /* [offset[comm->size]] grouped by destination, then ascending  */
 } rm_route;
 
-typedef struct rm_round {
-  rm_route of[2];   /* [side] */
-  rm_lid   num[2];  /* [side] cells that come here                                   */
-  uint8_t *role[2]; /* [side][num[side]] RM_ROLE_ of each, in the order they come in */
-} rm_round;
+/* What is listed for a block comes in shares: first of what came from ranks before this one, then of this rank's own cells,
+ * then of what came from ranks behind it. */
+enum { RM_BEFORE, RM_OWN, RM_BEHIND, RM_SHARES };
+
+typedef struct rm_block {
+  rm_route list[2]; /* [side] offset is [RM_SHARES + 1]; cells, by their numbers in what came or in the own mesh, ascend in
+                       each share                                                                               */
+  uint8_t *role[2]; /* [side][cells] RM_ROLE_ */
+} rm_block;
 
 struct rm_routes {
-  int       num;   /* the same on every rank, at least 1 */
-  rm_round *round; /* [num]                              */
+  rm_route  of[2];       /* [side] of this rank's cells to other ranks         */
+  rm_lid    num_came[2]; /* [side] cells of others that come here              */
+  int       num_blocks;  /* of this rank, at least 1                           */
+  rm_block *block;       /* [num_blocks]                                       */
 };
 
 /* Where the intervals end: rank r has the keys from key[r - 1] up to but not including key[r]; the first and the last rank's
@@ -158,8 +164,8 @@ remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *g
 remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_mesh *const mesh[2],
                            const rm_tags *tags, const rm_giants *giants, int64_t *work[2]);
 
-/* What every rank needs, as routes of this rank's cells, round by round: targets at their seats, the source cells whose boxes
- * they meet, and giants. Collective. *out lives in arena, what is needed on the way in scratch. */
+/* What every rank needs, as routes of this rank's cells, and what this rank's blocks need: targets at their seats, the source
+ * cells whose boxes they meet, and giants. Collective. *out lives in arena, what is needed on the way in scratch. */
 remap_status rm_part_match(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_cuts *cuts, const rm_tags *tags,
                            const rm_giants *giants, const rm_slicing *slicing, rm_routes *out);
 

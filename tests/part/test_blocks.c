@@ -1,5 +1,5 @@
-/* Blocks of a rank's interval, one per round, against brute force over all cells of both meshes: small meshes of several kinds,
- * handed in in several ways. */
+/* Blocks of a rank's interval against brute force over all cells of both meshes: small meshes of several kinds, handed in in
+ * several ways. */
 #include "part/part_private.h"
 #include "pairs.h"
 #include "rt.h"
@@ -9,6 +9,7 @@ typedef struct world {
   pairs_world      in;
   const rm_zone   *zone;
   const rm_routes *routes;
+  const rm_stock  *stock[2];
   rm_reason        reason;
 } world;
 
@@ -18,6 +19,8 @@ static void open_world(world *w, int kind, int deal, rm_slicing slicing)
   pairs_open(&w->in, (pairs_kind)kind, (tm_dealing)deal);
   RT_EQ(rm_zone_build(w->in.arena, &w->in.comm, w->in.mesh, &w->zone), REMAP_OK);
   RT_EQ(rm_part_plan(w->in.arena, &w->in.comm, &w->in.frame, w->in.mesh, w->zone, &slicing, &w->routes, &w->reason), REMAP_OK);
+  for (int side = 0; side < 2; side++)
+    RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, &w->stock[side], &w->reason), REMAP_OK);
 }
 
 static void for_all_worlds(void (*check)(world *w))
@@ -31,12 +34,12 @@ static void for_all_worlds(void (*check)(world *w))
   }
 }
 
-static rm_part send_round(world *w, int round)
+static rm_part take_block(world *w, int block)
 {
   rm_part part;
 
   for (int side = 0; side < 2; side++)
-    RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, round, &part.piece[side], &w->reason), REMAP_OK);
+    RT_EQ(rm_part_take(w->in.arena, w->routes, w->stock[side], block, &part.piece[side], &w->reason), REMAP_OK);
   RT_EQ(rm_part_check(&part), REMAP_OK);
   return part;
 }
@@ -85,8 +88,8 @@ static void check_pairs(world *w)
 {
   int64_t found = 0;
 
-  for (int round = 0; round < rm_part_rounds(w->routes); round++) {
-    const rm_part part = send_round(w, round);
+  for (int block = 0; block < rm_part_blocks(w->routes); block++) {
+    const rm_part part = take_block(w, block);
     const double(*box[2])[6];
 
     for (int side = 0; side < 2; side++) box[side] = boxes_of(w, &part.piece[side]);
@@ -98,12 +101,12 @@ static void check_pairs(world *w)
   RT_EQ(found, count_all(w));
 }
 
-static void every_pair_of_cells_with_meeting_boxes_is_made_in_one_round_on_one_rank(void)
+static void every_pair_of_cells_with_meeting_boxes_is_made_in_one_block_of_one_rank(void)
 {
   for_all_worlds(check_pairs);
 }
 
-/* What comes in every round together is each cell of any round once. */
+/* All blocks together have each cell of any block once. */
 static void check_union(world *w)
 {
   for (int side = 0; side < 2; side++) {
@@ -112,39 +115,44 @@ static void check_union(world *w)
     uint8_t     *here = rm_arena_zero(w->in.arena, (int64_t)n * w->in.comm.size, 1);
     int64_t      num  = 0;
 
-    for (int round = 0; round < rm_part_rounds(w->routes); round++) {
+    for (int block = 0; block < rm_part_blocks(w->routes); block++) {
       rm_piece p;
 
-      RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, round, &p, &w->reason), REMAP_OK);
+      RT_EQ(rm_part_take(w->in.arena, w->routes, w->stock[side], block, &p, &w->reason), REMAP_OK);
       for (rm_lid c = 0; c < p.num_cells; c++) here[(int64_t)p.cell_home_rank[c] * n + p.cell_home[c]] = 1;
     }
     for (int64_t k = 0; k < (int64_t)n * w->in.comm.size; k++) num += here[k];
-    RT_EQ(rm_part_send(w->in.arena, &w->in.comm, w->in.mesh[side], w->routes, RM_EVERY_ROUND, &all, &w->reason), REMAP_OK);
+    RT_EQ(rm_part_take(w->in.arena, w->routes, w->stock[side], RM_EVERY_BLOCK, &all, &w->reason), REMAP_OK);
     RT_EQ(all.num_cells, num);
     for (rm_lid c = 0; c < all.num_cells; c++) RT_EQ(here[(int64_t)all.cell_home_rank[c] * n + all.cell_home[c]], 1);
   }
 }
 
-static void all_rounds_at_once_bring_every_cell_of_any_round_once(void) { for_all_worlds(check_union); }
+static void all_blocks_at_once_have_every_cell_of_any_block_once(void) { for_all_worlds(check_union); }
 
-static void sources_that_meet_everything_make_one_round(void)
+static int64_t most_blocks(int kind, rm_slicing slicing)
+{
+  int64_t num;
+  world   w;
+
+  open_world(&w, kind, 0, slicing);
+  num = rm_part_blocks(w.routes);
+  RT_EQ(rm_comm_max_i64(&w.in.comm, &num, 1), REMAP_OK);
+  pairs_close(&w.in);
+  return num;
+}
+
+static void sources_that_meet_everything_make_one_block(void)
 {
   for (int kind = 0; kind < pairs_num_kinds(); kind++) {
-    world w;
-    int   rounds;
+    const int64_t many = most_blocks(kind, (rm_slicing){100, INFINITY});
+    const int64_t few  = most_blocks(kind, (rm_slicing){100, 0.0}); /* no triangle may come twice */
 
-    open_world(&w, kind, 0, (rm_slicing){100, INFINITY});
-    rounds = rm_part_rounds(w.routes);
-    pairs_close(&w.in);
-    open_world(&w, kind, 0, (rm_slicing){100, 0.0}); /* no triangle may come twice */
-    RT_CHECK(rm_part_rounds(w.routes) <= rounds);
-    if (kind == PAIRS_PARTLY) RT_CHECK(rounds > 1 && rm_part_rounds(w.routes) == 1);
-    pairs_close(&w.in);
-    open_world(&w, kind, 0, rm_one_block);
-    RT_EQ(rm_part_rounds(w.routes), 1);
-    pairs_close(&w.in);
+    RT_CHECK(few <= many);
+    if (kind == PAIRS_PARTLY) RT_CHECK(many > 1 && few == 1);
+    RT_EQ(most_blocks(kind, rm_one_block), 1);
   }
 }
 
-RT_MAIN(RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_in_one_round_on_one_rank),
-        RT_CASE(all_rounds_at_once_bring_every_cell_of_any_round_once), RT_CASE(sources_that_meet_everything_make_one_round))
+RT_MAIN(RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_in_one_block_of_one_rank),
+        RT_CASE(all_blocks_at_once_have_every_cell_of_any_block_once), RT_CASE(sources_that_meet_everything_make_one_block))
