@@ -6,93 +6,7 @@
 #include <remap/remap.h>
 #include "balance.h"
 #include "bench.h"
-
-enum { MOST_RANKS = 4096 };
-
-/* What this rank sends to others, as MPI is asked to. */
-static struct {
-  double messages, bytes, collectives, collective_bytes; /* the last: what this rank puts into them */
-  char   partner[MOST_RANKS];
-} counted_;
-
-static void collective_(double bytes) { counted_.collectives++, counted_.collective_bytes += bytes; }
-
-static double size_(int n, MPI_Datatype type)
-{
-  int size = 0;
-
-  PMPI_Type_size(type, &size);
-  return (double)n * size;
-}
-
-static void message_(double bytes, int to)
-{
-  counted_.messages++;
-  counted_.bytes += bytes;
-  if (to < MOST_RANKS) counted_.partner[to] = 1;
-}
-
-int MPI_Isend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
-{
-  message_(size_(n, type), to);
-  return PMPI_Isend(data, n, type, to, tag, comm, request);
-}
-int MPI_Issend(const void *data, int n, MPI_Datatype type, int to, int tag, MPI_Comm comm, MPI_Request *request)
-{
-  message_(size_(n, type), to);
-  return PMPI_Issend(data, n, type, to, tag, comm, request);
-}
-int MPI_Ibarrier(MPI_Comm comm, MPI_Request *request)
-{
-  collective_(0);
-  return PMPI_Ibarrier(comm, request);
-}
-int MPI_Allreduce(const void *mine, void *all, int n, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
-{
-  collective_(size_(n, type));
-  return PMPI_Allreduce(mine, all, n, type, op, comm);
-}
-int MPI_Exscan(const void *mine, void *all, int n, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
-{
-  collective_(size_(n, type));
-  return PMPI_Exscan(mine, all, n, type, op, comm);
-}
-int MPI_Bcast(void *data, int n, MPI_Datatype type, int root, MPI_Comm comm)
-{
-  collective_(size_(n, type));
-  return PMPI_Bcast(data, n, type, root, comm);
-}
-int MPI_Allgather(const void *mine, int n, MPI_Datatype type, void *all, int m, MPI_Datatype its, MPI_Comm comm)
-{
-  collective_(size_(n, type));
-  return PMPI_Allgather(mine, n, type, all, m, its, comm);
-}
-int MPI_Allgatherv(const void *mine, int n, MPI_Datatype type, void *all, const int *m, const int *at, MPI_Datatype its,
-                   MPI_Comm comm)
-{
-  int rank;
-
-  PMPI_Comm_rank(comm, &rank);
-  collective_(size_(m[rank], its));
-  return PMPI_Allgatherv(mine, n, type, all, m, at, its, comm);
-}
-int MPI_Alltoall(const void *mine, int n, MPI_Datatype type, void *all, int m, MPI_Datatype its, MPI_Comm comm)
-{
-  int ranks;
-
-  PMPI_Comm_size(comm, &ranks);
-  collective_(size_(m, its) * ranks);
-  return PMPI_Alltoall(mine, n, type, all, m, its, comm);
-}
-
-/* messages, bytes, partners, collectives, their bytes; and forget them. */
-static void take_counts(double out[5])
-{
-  out[0] = counted_.messages, out[1] = counted_.bytes, out[2] = 0;
-  out[3] = counted_.collectives, out[4] = counted_.collective_bytes;
-  for (int r = 0; r < MOST_RANKS; r++) out[2] += counted_.partner[r];
-  memset(&counted_, 0, sizeof counted_);
-}
+#include "counted.h"
 
 static remap_status run(remap_context *ctx, tm_mesh *const mine[2], double out[12])
 {
@@ -102,16 +16,16 @@ static remap_status run(remap_context *ctx, tm_mesh *const mine[2], double out[1
   remap_status     status = REMAP_OK;
 
   for (int side = 0; side < 2 && status == REMAP_OK; side++) status = remap_set_mesh(ctx, side, &mine[side]->view);
-  memset(&counted_, 0, sizeof counted_);
+  counted_take(NULL);
   if (status == REMAP_OK) status = remap_build(ctx);
-  take_counts(out);
+  counted_take(out);
   out[10] = bench_heap_peak() - held;
   out[11] = bench_heap_now() - held;
   for (int k = 0; k < 2 && status == REMAP_OK; k++) { /* the first prepares the stencils */
-    memset(&counted_, 0, sizeof counted_);
+    counted_take(NULL);
     status = remap_field(ctx, REMAP_FORWARD, NULL, 1, &one, NULL);
   }
-  take_counts(out + 5);
+  counted_take(out + 5);
   free(u), free(v);
   return status;
 }

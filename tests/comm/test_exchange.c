@@ -336,6 +336,31 @@ static void a_rank_without_memory_stops_a_plan_everywhere(void)
   rm_comm_free(&comm);
 }
 
+/* Ranks 2 k and 2 k + 1 swap; a last one without partner does not. */
+static void two_ranks_swap_arrays_of_any_lengths_and_what_a_rank_has_no_room_for_is_taken_away(void)
+{
+  static const int64_t length[] = {0, 1, 2000, 2047, 2048, 5000, 0, 1000000};
+  enum { NUM = sizeof length / sizeof *length };
+  rm_comm comm = world();
+  const int with = comm.rank ^ 1;
+
+  for (int k = 0; k < 2 * NUM && with < comm.size; k++) {
+    const int64_t mine = length[(k + comm.rank % 2) % NUM], its = length[(k + with % 2) % NUM];
+    const bool    fails = k >= NUM && comm.rank % 2;
+    rm_arena     *arena = rm_arena_new();
+    int64_t      *send  = rm_arena_alloc(arena, mine, sizeof *send), num = -1;
+    void         *recv  = NULL;
+
+    for (int64_t i = 0; i < mine; i++) send[i] = word(comm.rank, with, i + k);
+    if (fails) rm_arena_fail_at(arena, 1);
+    RT_EQ(rm_comm_swap(&comm, arena, with, sizeof *send, mine, send, &num, &recv), fails ? REMAP_NO_MEMORY : REMAP_OK);
+    RT_EQ(num, fails ? 0 : its);
+    for (int64_t i = 0; i < num; i++) RT_CHECK(((int64_t *)recv)[i] == word(with, comm.rank, i + k));
+    rm_arena_drop(arena);
+  }
+  rm_comm_free(&comm);
+}
+
 RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any_size_give_the_same_arrays),
         RT_CASE(nothing_at_all_can_be_exchanged), RT_CASE(exchanges_that_follow_each_other_at_once_stay_apart),
         RT_CASE(only_those_who_have_something_to_say_send_anything),
@@ -343,4 +368,5 @@ RT_MAIN(RT_CASE(items_arrive_in_the_order_of_the_senders), RT_CASE(chunks_of_any
         RT_CASE(a_plan_brings_what_each_rank_wants_again_and_again),
         RT_CASE(flows_bring_items_and_the_worst_status_of_their_senders),
         RT_CASE(who_says_something_else_is_apart_from_its_peers), RT_CASE(only_neighbours_take_part_in_a_plan),
-        RT_CASE(a_rank_without_memory_stops_a_plan_everywhere))
+        RT_CASE(a_rank_without_memory_stops_a_plan_everywhere),
+        RT_CASE(two_ranks_swap_arrays_of_any_lengths_and_what_a_rank_has_no_room_for_is_taken_away))

@@ -43,6 +43,12 @@ remap_status rm_comm_allgatherv(const rm_comm *comm, rm_arena *arena, const void
 remap_status rm_comm_exchange(const rm_comm *comm, rm_arena *arena, size_t size, const int64_t *send_offset, const void *send,
                               int64_t *recv_offset, void **recv);
 
+/* Send n items of `size` bytes to the rank `with`, and receive *num of its, *recv in arena; it calls this for this rank at the
+ * same time. Among these two only, in one message each way if it is short. NO_MEMORY on the rank that lacks it: what it was
+ * sent is lost, *num is 0, and the other has its items all the same. */
+remap_status rm_comm_swap(const rm_comm *comm, rm_arena *arena, int with, size_t size, int64_t n, const void *send,
+                          int64_t *num, void **recv);
+
 /* plan -- who sends what to whom, again and again: what each rank wants from cells of other ranks. Read-only once built. */
 typedef struct rm_plan {
   int            num_send, num_recv;         /* neighbours, this rank among them if it wants from itself */

@@ -1,7 +1,10 @@
 /* search -- the mapped cell of nearest centroid in a distributed mesh. Every rank holds a k-d tree of its mapped cells; a point
- * asks the rank whose box is nearest first, then every rank whose box is not farther than the answer. Box distances are rounded
- * like true ones, so they never exceed them, and the answer is the same for every partition. */
+ * asks the rank whose box is nearest first, or if there are very many one whose box is joined with that; then every rank whose
+ * box is not farther than the answer. Box distances are rounded like true ones, so they never exceed them, and the answer is
+ * the same for every partition. */
 #include "field_private.h"
+
+#include <stdlib.h>
 
 enum { LEAF = 8 };
 
@@ -15,7 +18,7 @@ typedef struct tree_point {
 typedef struct tree {
   tree_point   *point; /* [num] */
   int64_t       num;
-  double        box[6];
+  double        box[6];  /* around them */
   const rm_gid *global; /* of the mesh's cells */
   int           rank;
 } tree;
@@ -153,84 +156,170 @@ static double box_distance2(const double box[6], const double x[3])
   return sum;
 }
 
-/* Points to ask about, grouped by rank. */
+/* Points to ask about, by rank: key is the rank, item the point. */
 typedef struct questions {
-  int64_t *offset; /* [comm->size + 1] */
-  int64_t *point;  /* [offset[comm->size]] */
+  int64_t   num, room;
+  rm_keyed *question; /* malloc'ed */
 } questions;
 
-/* First round, nothing found yet: the rank of the nearest box. Second: every other rank whose box is near enough. */
-static bool is_asked(const double (*box)[6], int rank, int nearest_rank, const double x[3], const rm_origin *found)
+static remap_status add_question(questions *q, int64_t rank, int64_t point)
 {
-  if (found->rank < 0) return rank == nearest_rank;
-  return rank != nearest_rank && box_distance2(box[rank], x) <= rm_distance2(x, found->xyz);
-}
-
-static remap_status choose_questions(rm_arena *scratch, const rm_comm *comm, const double (*box)[6], int64_t num_points,
-                                     const double (*point)[3], const int *nearest_rank, const rm_origin *found, questions *q)
-{
-  int64_t num = 0;
-
-  RM_NEW0(q->offset, scratch, (int64_t)comm->size + 1);
-  for (int r = 0; r < comm->size; r++)
-    for (int64_t k = 0; k < num_points; k++) q->offset[r] += is_asked(box, r, nearest_rank[k], point[k], &found[k]);
-  rm_offsets(q->offset, comm->size);
-  RM_NEW(q->point, scratch, q->offset[comm->size]);
-  for (int r = 0; r < comm->size; r++)
-    for (int64_t k = 0; k < num_points; k++)
-      if (is_asked(box, r, nearest_rank[k], point[k], &found[k])) q->point[num++] = k;
+  RM_TRY(rm_grow(&q->question, &q->room, q->num + 1, sizeof *q->question));
+  q->question[q->num++] = (rm_keyed){(uint64_t)rank, point};
   return REMAP_OK;
 }
 
-/* Send the questions, answer those of others, and take the answers into account. Collective. */
-static remap_status ask(rm_arena *scratch, const rm_comm *comm, const tree *t, const questions *q, const double (*point)[3],
-                        rm_origin *found)
+/* The questions in the order of their ranks, what they are, and room for the offsets of what comes and goes. Not collective. */
+typedef struct letters {
+  int64_t *offset, *heard, *back; /* [comm->size + 1] of questions, of what others ask, of answers */
+  double (*point)[3];             /* [offset[comm->size]]                                          */
+} letters;
+
+static remap_status write_letters(rm_arena *scratch, const rm_comm *comm, questions *q, const double (*point)[3], letters *l)
 {
-  const int64_t num = q->offset[comm->size];
-  double(*send)[3]  = rm_arena_alloc(scratch, num, sizeof *send);
-  int64_t   *heard  = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *heard);
-  int64_t   *back   = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *back);
+  rm_keyed *spare;
+
+  RM_NEW(spare, scratch, q->num);
+  RM_NEW(l->point, scratch, q->num);
+  RM_NEW0(l->offset, scratch, (int64_t)comm->size + 1);
+  RM_NEW(l->heard, scratch, (int64_t)comm->size + 1);
+  RM_NEW(l->back, scratch, (int64_t)comm->size + 1);
+  rm_sort_keyed(q->question, spare, q->num);
+  for (int64_t k = 0; k < q->num; k++) {
+    l->offset[q->question[k].key]++;
+    for (int d = 0; d < 3; d++) l->point[k][d] = point[q->question[k].item][d];
+  }
+  rm_offsets(l->offset, comm->size);
+  return REMAP_OK;
+}
+
+/* Send the questions, answer those of others, and take the answers into account. status: of making the questions here.
+ * Collective. */
+static remap_status ask(rm_arena *scratch, const rm_comm *comm, const tree *t, remap_status status, questions *q,
+                        const double (*point)[3], rm_origin *found)
+{
+  letters    l = {0};
   rm_origin *answer;
   void      *recv;
 
-  RM_TRY(rm_comm_agree(comm, send && heard && back ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(send && heard && back);
-  for (int64_t k = 0; k < num; k++)
-    for (int d = 0; d < 3; d++) send[k][d] = point[q->point[k]][d];
-  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *send, q->offset, send, heard, &recv));
-  answer = rm_arena_alloc(scratch, heard[comm->size], sizeof *answer);
+  if (status == REMAP_OK) status = write_letters(scratch, comm, q, point, &l);
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *l.point, l.offset, l.point, l.heard, &recv));
+  answer = rm_arena_alloc(scratch, l.heard[comm->size], sizeof *answer);
   RM_TRY(rm_comm_agree(comm, answer ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(answer);
-  for (int64_t k = 0; k < heard[comm->size]; k++) {
+  for (int64_t k = 0; k < l.heard[comm->size]; k++) {
     answer[k] = (rm_origin){.rank = -1};
     search(t, 0, t->num, ((const double(*)[3])recv)[k], &answer[k]);
   }
-  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *answer, heard, answer, back, &recv));
-  for (int64_t k = 0; k < num; k++) improve(point[q->point[k]], &((const rm_origin *)recv)[k], &found[q->point[k]]);
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *answer, l.heard, answer, l.back, &recv));
+  for (int64_t k = 0; k < q->num; k++) {
+    const int64_t asked = q->question[k].item;
+
+    improve(point[asked], &((const rm_origin *)recv)[k], &found[asked]);
+  }
   return REMAP_OK;
+}
+
+/* A first answer: of the nearest crowd, one box per rank or joined ones. Collective. */
+static remap_status ask_nearest(rm_arena *scratch, const rm_comm *comm, const tree *t, int64_t num_points,
+                                const double (*point)[3], int64_t *first_rank, rm_origin *found)
+{
+  const double everywhere[1][6] = {{-DBL_MAX, -DBL_MAX, -DBL_MAX, DBL_MAX, DBL_MAX, DBL_MAX}};
+  questions    q                = {0};
+  rm_crowds    crowds;
+  remap_status status;
+
+  RM_TRY(rm_crowds_meet(scratch, comm, t->num > 0, &t->box, num_points > 0, everywhere, RM_SOME_CROWDS, &crowds));
+  status = REMAP_OK;
+  for (int64_t k = 0; k < num_points && status == REMAP_OK; k++) {
+    double nearest = INFINITY;
+
+    found[k]      = (rm_origin){.rank = -1};
+    first_rank[k] = -1;
+    for (rm_lid c = 0; c < crowds.num; c++) {
+      const double distance = box_distance2(crowds.box[c], point[k]);
+
+      if (first_rank[k] >= 0 && distance >= nearest) continue;
+      nearest       = distance;
+      first_rank[k] = crowds.crowd[c].rank;
+    }
+    if (first_rank[k] >= 0) status = add_question(&q, first_rank[k], k);
+  }
+  status = ask(scratch, comm, t, status, &q, point, found);
+  free(q.question);
+  return status;
+}
+
+/* A point that looks for crowds that are not farther than what it found. */
+typedef struct doubt {
+  const rm_crowds *crowds;
+  questions       *q;
+  const double    *x;
+  double           distance2;
+  int64_t          point, first_rank;
+  remap_status     status;
+} doubt;
+
+static int doubt_rank(void *user, rm_lid item)
+{
+  doubt        *d    = user;
+  const int64_t rank = d->crowds->crowd[item].rank;
+
+  if (rank != d->first_rank && box_distance2(d->crowds->box[item], d->x) <= d->distance2)
+    d->status = add_question(d->q, rank, d->point);
+  return d->status != REMAP_OK;
+}
+
+/* The box of all that is not farther from a point than what it found, rounding included. */
+static void box_around(const double x[3], const rm_origin *found, double box[6])
+{
+  const double reach = sqrt(rm_distance2(x, found->xyz)) * (1 + 0x1p-40);
+
+  for (int d = 0; d < 3; d++) {
+    box[d]     = x[d] - reach;
+    box[d + 3] = x[d] + reach;
+  }
+}
+
+/* Ask every other rank that may know better. Collective. */
+static remap_status ask_others(rm_arena *scratch, const rm_comm *comm, const tree *t, int64_t num_points,
+                               const double (*point)[3], const int64_t *first_rank, rm_origin *found)
+{
+  double     (*around)[6] = rm_arena_alloc(scratch, num_points, sizeof *around);
+  questions    q          = {0};
+  rm_lid       num        = 0;
+  rm_crowds    crowds;
+  remap_status status = !around ? REMAP_NO_MEMORY : num_points > INT32_MAX ? REMAP_TOO_LARGE : REMAP_OK;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(around);
+  for (int64_t k = 0; k < num_points; k++)
+    if (found[k].rank >= 0) box_around(point[k], &found[k], around[num++]);
+  RM_TRY(rm_crowds_meet(scratch, comm, t->num > 0, &t->box, num, (const double(*)[6])around, RM_ALL_CROWDS, &crowds));
+  num = 0;
+  for (int64_t k = 0; k < num_points && status == REMAP_OK; k++) {
+    doubt d = {&crowds, &q, point[k], 0, k, first_rank[k], REMAP_OK};
+
+    if (found[k].rank < 0) continue;
+    d.distance2 = rm_distance2(point[k], found[k].xyz);
+    (void)rm_boxtree_query(crowds.tree, crowds.box, around[num++], doubt_rank, &d);
+    status = d.status;
+  }
+  status = ask(scratch, comm, t, status, &q, point, found);
+  free(q.question);
+  return status;
 }
 
 remap_status rm_nearest_anywhere(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const uint8_t *cover,
                                  int64_t num_points, const double (*point)[3], rm_origin *found)
 {
-  double(*box)[6]        = rm_arena_alloc(scratch, comm->size, sizeof *box);
-  int      *nearest_rank = rm_arena_alloc(scratch, num_points, sizeof *nearest_rank);
-  tree      t            = {.num = 0};
-  questions q            = {0};
+  int64_t     *first_rank = rm_arena_alloc(scratch, num_points, sizeof *first_rank);
+  tree         t          = {.num = 0};
+  remap_status mine       = first_rank ? build_tree(scratch, comm, mesh, cover, &t) : REMAP_NO_MEMORY;
 
-  RM_TRY(rm_comm_agree(comm, box && nearest_rank ? build_tree(scratch, comm, mesh, cover, &t) : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(box && nearest_rank);
-  RM_TRY(rm_comm_allgather(comm, t.box, box, 6, sizeof(double)));
-  for (int64_t k = 0; k < num_points; k++) {
-    found[k]        = (rm_origin){.rank = -1};
-    nearest_rank[k] = 0;
-    for (int r = 1; r < comm->size; r++)
-      if (box_distance2(box[r], point[k]) < box_distance2(box[nearest_rank[k]], point[k])) nearest_rank[k] = r;
-  }
-  for (int round = 0; round < 2; round++) {
-    RM_TRY(rm_comm_agree(
-        comm, choose_questions(scratch, comm, (const double(*)[6])box, num_points, point, nearest_rank, found, &q), NULL));
-    RM_TRY(ask(scratch, comm, &t, &q, point, found));
-  }
-  return REMAP_OK;
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(first_rank);
+  RM_TRY(ask_nearest(scratch, comm, &t, num_points, point, first_rank, found));
+  return ask_others(scratch, comm, &t, num_points, point, first_rank, found);
 }

@@ -1,7 +1,7 @@
 /* stencil -- vertex neighbours of every cell, here and on other ranks, and their least-squares weights.
  *
- * Cells of one rank meet at nodes. Cells of other ranks are found in three exchanges: a node that lies in the box of another
- * rank's nodes is announced to the rank its coordinates hash to; that rank tells all who announced the same point of each
+ * Cells of one rank meet at nodes. Cells of other ranks are found in three exchanges: a node that lies in a crowd of another
+ * rank's cells is announced to the rank its coordinates hash to; that rank tells all who announced the same point of each
  * other; those send each other the cells around it. Nodes are told apart by coordinates alone, so what is found does not
  * depend on the partition. O(n) time and, for hexahedra, about 900 bytes per cell.
  *
@@ -110,53 +110,24 @@ static remap_status list_nodes(draft *d, rm_stencil *stencil)
 
 /* ---- cells of other ranks -------------------------------------------------------------------------------------- */
 
-static void box_of_nodes(const rm_mesh *mesh, double box[6])
-{
-  for (int c = 0; c < 3; c++) {
-    box[c]     = INFINITY;
-    box[c + 3] = -INFINITY;
-  }
-  for (rm_lid k = 0; k < mesh->num_nodes; k++)
-    for (int c = 0; c < 3; c++) {
-      box[c]     = fmin(box[c], mesh->node_xyz[k][c]);
-      box[c + 3] = fmax(box[c + 3], mesh->node_xyz[k][c]);
-    }
-}
-
-static bool box_holds(const double box[6], const double x[3])
-{
-  return box[0] <= x[0] && x[0] <= box[3] && box[1] <= x[1] && x[1] <= box[4] && box[2] <= x[2] && x[2] <= box[5];
-}
-
-static bool boxes_meet(const double a[6], const double b[6])
-{
-  return a[0] <= b[3] && b[0] <= a[3] && a[1] <= b[4] && b[1] <= a[4] && a[2] <= b[5] && b[2] <= a[5];
-}
-
-/* The nodes that another rank may hold too, grouped by the rank their coordinates hash to; box is [comm->size][6]. */
-static remap_status pack_announcements(draft *d, double (*box)[6], int64_t *offset, announcement **out)
+/* The nodes that another rank may hold too, grouped by the rank their coordinates hash to. */
+static remap_status pack_announcements(draft *d, const rm_crowds *crowds, int64_t *offset, announcement **out)
 {
   const rm_comm *comm = d->comm;
   const rm_mesh *mesh = d->mesh;
-  int           *to; /* [num_nodes] where a node is announced, -1: nowhere */
-  int            num_boxes = 0;
-  const double  *mine      = box[comm->rank];
-  double(*near)[6];
-  int64_t *next;
+  const double(*box)[6] = crowds->box + crowds->num_own; /* of other ranks */
+  const rm_boxtree *tree;
+  int              *to; /* [num_nodes] where a node is announced, -1: nowhere */
+  int64_t          *next;
 
+  RM_TRY(rm_boxtree_build(d->scratch, crowds->num - crowds->num_own, box, &tree));
   RM_NEW(to, d->scratch, mesh->num_nodes);
-  RM_NEW(near, d->scratch, comm->size);
   RM_NEW(next, d->scratch, comm->size);
-  for (int r = 0; r < comm->size; r++) {
-    if (r == comm->rank || !boxes_meet(box[r], mine)) continue;
-    for (int c = 0; c < 6; c++) near[num_boxes][c] = box[r][c];
-    num_boxes++;
-  }
   for (int r = 0; r <= comm->size; r++) offset[r] = 0;
   for (rm_lid k = 0; k < mesh->num_nodes; k++) {
-    to[k] = -1;
-    for (int b = 0; b < num_boxes && to[k] < 0; b++)
-      if (box_holds(near[b], mesh->node_xyz[k])) to[k] = (int)(rm_hash_point(mesh->node_xyz[k]) % (uint64_t)comm->size);
+    const double *x = mesh->node_xyz[k], point[6] = {x[0], x[1], x[2], x[0], x[1], x[2]};
+
+    to[k] = rm_boxtree_meets(tree, box, point) ? (int)(rm_hash_point(x) % (uint64_t)comm->size) : -1;
     if (to[k] >= 0) offset[to[k]]++;
   }
   rm_offsets(offset, comm->size);
@@ -305,18 +276,18 @@ static remap_status meet_other_ranks(draft *d)
   const rm_comm *comm        = d->comm;
   int64_t       *send_offset = rm_arena_alloc(d->scratch, (int64_t)comm->size + 1, sizeof *send_offset);
   int64_t       *recv_offset = rm_arena_alloc(d->scratch, (int64_t)comm->size + 1, sizeof *recv_offset);
-  double(*box)[6]            = rm_arena_alloc(d->scratch, comm->size, sizeof *box);
-  double        mine[6];
-  announcement *announced = NULL;
-  meeting      *met       = NULL;
-  visitor      *visitors  = NULL;
-  void         *recv      = NULL;
+  const rm_mesh *mesh        = d->mesh;
+  rm_crowds      crowds;
+  announcement  *announced = NULL;
+  meeting       *met       = NULL;
+  visitor       *visitors  = NULL;
+  void          *recv      = NULL;
 
-  RM_TRY(rm_comm_agree(comm, send_offset && recv_offset && box ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_ASSERT(send_offset && recv_offset && box);
-  box_of_nodes(d->mesh, mine);
-  RM_TRY(rm_comm_allgather(comm, mine, box, 6, sizeof(double)));
-  RM_TRY(rm_comm_agree(comm, pack_announcements(d, box, send_offset, &announced), NULL));
+  RM_TRY(rm_comm_agree(comm, send_offset && recv_offset ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_ASSERT(send_offset && recv_offset);
+  RM_TRY(rm_crowds_meet(d->scratch, comm, mesh->num_cells, mesh->cell_box, mesh->num_cells, mesh->cell_box, RM_SOME_CROWDS,
+                        &crowds));
+  RM_TRY(rm_comm_agree(comm, pack_announcements(d, &crowds, send_offset, &announced), NULL));
   RM_TRY(rm_comm_exchange(comm, d->scratch, sizeof *announced, send_offset, announced, recv_offset, &recv));
   RM_TRY(rm_comm_agree(comm, pack_meetings(d, recv_offset, recv, send_offset, &met), NULL));
   RM_TRY(rm_comm_exchange(comm, d->scratch, sizeof *met, send_offset, met, recv_offset, &recv));

@@ -1,54 +1,50 @@
-/* crowd -- where the tags of other ranks are, coarsely, and what of this rank may meet them. Every rank knows the crowds of
- * all: at most RM_ZONE_BOXES boxes per rank. Source tags that meet a crowd of another rank's targets are told there; those are
- * mostly the neighbours along the Morton curve. O(n log B) time for n tags and B crowds; 64 bytes per visitor. */
+/* crowd -- where the tags of other ranks are, coarsely, and what of this rank may meet them. Source tags that meet a crowd of
+ * another rank's targets are told there; those are mostly the neighbours along the Morton curve. O(n log B) time for n tags and
+ * B crowds that are near; 64 bytes per visitor. */
 #include "part/part_private.h"
 
 #include <string.h>
 
 /* ---- crowds ------------------------------------------------------------------------------------------------------- */
 
-/* This rank's boxes of a side, around the tags that are no giants. Not collective. */
-static remap_status group(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowd *mine, int *num_mine)
+/* The boxes of the tags of a side that are no giants. Not collective. */
+static remap_status small_boxes(rm_arena *arena, const rm_tags *tags, int side, rm_lid *num, double (**out)[6])
 {
-  double (*box)[6], group[RM_ZONE_BOXES][6];
-  rm_lid num = 0;
-
-  RM_NEW(box, arena, tags->num[side]);
+  RM_NEW(*out, arena, tags->num[side]);
+  *num = 0;
   for (rm_lid k = 0; k < tags->num[side]; k++)
-    if (!tags->tag[side][k].is_giant) memcpy(box[num++], tags->box[side][k], sizeof *box);
-  RM_TRY(rm_box_groups(arena, num, (const double(*)[6])box, rm_zone_boxes(comm->size), group, num_mine));
-  for (int g = 0; g < *num_mine; g++) {
-    memcpy(mine[g].box, group[g], sizeof group[g]);
-    mine[g].rank = comm->rank;
-    mine[g].num  = (double)num / *num_mine;
-  }
+    if (!tags->tag[side][k].is_giant) memcpy((*out)[(*num)++], tags->box[side][k], sizeof **out);
   return REMAP_OK;
 }
 
-/* A tree over the crowds. Not collective. */
-static remap_status grow_tree(rm_arena *arena, int64_t num, const rm_crowd *crowd, rm_crowds *out)
+remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_lid num_asking,
+                            const double (*asking)[6], rm_lid most, rm_crowds *out)
 {
-  double (*box)[6];
+  rm_arena    *scratch = rm_arena_new();
+  double     (*box)[6] = NULL;
+  rm_lid       num     = 0;
+  remap_status status  = scratch ? small_boxes(scratch, tags, side, &num, &box) : REMAP_NO_MEMORY;
 
-  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_NEW(box, arena, num);
-  for (int64_t g = 0; g < num; g++) memcpy(box[g], crowd[g].box, sizeof *box);
-  *out = (rm_crowds){.num = (rm_lid)num, .crowd = crowd, .box = (const double(*)[6])box};
-  return rm_boxtree_build(arena, (rm_lid)num, out->box, &out->tree);
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  status = rm_crowds_meet(arena, comm, num, (const double(*)[6])box, num_asking, asking, most, out);
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
-remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out)
+/* The crowds of targets that the small sources seated here may meet. Collective. */
+static remap_status target_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, rm_crowds *out)
 {
-  rm_crowd    *mine     = rm_arena_alloc(arena, RM_ZONE_BOXES, sizeof *mine);
-  int64_t     *offset   = rm_arena_alloc(arena, (int64_t)comm->size + 1, sizeof *offset);
-  int          num_mine = 0;
-  void        *all;
-  remap_status status = mine && offset ? group(arena, comm, tags, side, mine, &num_mine) : REMAP_NO_MEMORY;
+  rm_arena    *scratch = rm_arena_new();
+  double     (*box)[6] = NULL;
+  rm_lid       num     = 0;
+  remap_status status  = scratch ? small_boxes(scratch, tags, REMAP_SOURCE, &num, &box) : REMAP_NO_MEMORY;
 
-  RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_ASSERT(mine && offset);
-  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num_mine, sizeof *mine, offset, &all));
-  return rm_comm_agree(comm, grow_tree(arena, offset[comm->size], all, out), NULL);
+  RM_GOTO(done, status = rm_comm_agree(comm, status, NULL));
+  status = rm_part_crowds(arena, comm, tags, REMAP_TARGET, num, (const double(*)[6])box, RM_ALL_CROWDS, out);
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
 /* ---- visitors ----------------------------------------------------------------------------------------------------- */
@@ -126,7 +122,7 @@ remap_status rm_part_receive_visitors(rm_arena *arena, const rm_comm *comm, cons
   rm_crowds    crowds;
   remap_status status;
 
-  RM_TRY(rm_part_crowds(arena, comm, tags, REMAP_TARGET, &crowds));
+  RM_TRY(target_crowds(arena, comm, tags, &crowds));
   status = offset && arrived ? list_visitors(arena, comm, tags, &crowds, offset, &visitor, &box) : REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
   RM_ASSERT(offset && arrived);

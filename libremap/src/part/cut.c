@@ -1,17 +1,18 @@
 /* cut -- intervals of Morton keys, one per rank: first of even numbers of cells, then of even estimated work.
  *
- * Cells that lie anywhere are cut by bisecting the range of keys: the cuts are quantiles to within a 64th of a rank's share,
+ * Cells that lie anywhere are cut by dividing the range of keys: the cuts are quantiles to within a 64th of a rank's share,
  * depend on the zone's cells and not on who hands them in, and cells of equal key stay together. O(n) time to sort n keys here;
- * then at most ROUNDS sums over all ranks of WAYS - 1 numbers for each range in which a cut is still looked for, for which a
- * rank walks along its keys once. Few ranges are left apart at first, few cuts are not found at last: on P ranks about three
- * sums of P ranges. Tags that lie in order over the ranks are cut by adding up: O(n) and two small collectives. */
+ * then sums over all ranks of WAYS - 1 numbers for each range in which a cut is still looked for, or of one number where these
+ * ranges are many: that takes more sums, and fewer numbers in all. A rank walks along its keys once for each sum. Few ranges
+ * are left apart at first, few cuts are not found at last: on P ranks some six sums of P numbers. Tags that lie in order over
+ * the ranks are cut by adding up: O(n) and two small collectives. */
 #include "part/part_private.h"
 
 #include <float.h>
 
-/* Every round divides the range that holds a cut by WAYS. A cut is good enough if a SLACK-th of a rank's share is on the wrong
- * side. */
-enum { WAY_BITS = 3, WAYS = 1 << WAY_BITS, ROUNDS = RM_KEY_BITS / WAY_BITS, SLACK = 64 };
+/* Every round divides the ranges that hold cuts by WAYS, or by two if they are more than FEW_RANGES. A cut is good enough if a
+ * SLACK-th of a rank's share is on the wrong side. */
+enum { WAYS = 8, FEW_RANGES = 16, SLACK = 64 };
 
 /* The search for all cuts at once. A cut that is open lies in [low, low + width); ranges of two are the same or apart. */
 typedef struct search {
@@ -19,13 +20,13 @@ typedef struct search {
   const rm_keyed *keyed;    /* [num_keys] this rank's keys, ascending           */
   int             num_cuts; /* comm->size - 1                                   */
   uint64_t        width;
+  int             ways;     /* by which the ranges are divided                  */
   uint64_t       *low;      /* [num_cuts] of the range, or the cut if it is found */
   int64_t        *goal;     /* [num_cuts] cells that shall lie below the cut    */
   int64_t         slack;    /* cells by which that may be missed                */
   int             num_open;
   int            *open;     /* [num_open] cuts that are not found yet, ascending */
-  int64_t        *below;    /* [num_cuts][WAYS - 1] for each range with open cuts, ascending: cells of all ranks below its
-                               inner probes */
+  int64_t        *below;    /* [ranges with open cuts][ways - 1] ascending: cells of all ranks below inner probes */
 } search;
 
 remap_status rm_part_frame(const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], const rm_zone *zone,
@@ -127,7 +128,7 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   RM_NEW(s->low, arena, s->num_cuts);
   RM_NEW(s->goal, arena, s->num_cuts);
   RM_NEW(s->open, arena, s->num_cuts);
-  RM_NEW(s->below, arena, (int64_t)s->num_cuts * (WAYS - 1));
+  RM_NEW(s->below, arena, (int64_t)s->num_cuts + FEW_RANGES * (WAYS - 1));
   for (int side = 0; side < 2; side++)
     for (rm_lid k = 0; k < zone->num_cells[side]; k++) {
       keyed[num] = (rm_keyed){rm_part_key(zone_frame, mesh[side]->cell_box[zone->cell[side][k]]), num};
@@ -139,35 +140,43 @@ static remap_status prepare(rm_arena *arena, const rm_comm *comm, const rm_frame
   return REMAP_OK;
 }
 
-/* The ranges with open cuts, each divided by WAYS - 1 probes: how many cells of this rank lie below these. Returns how many
- * ranges there are. */
-static int probe(search *s)
+/* Is the range of open cut k another one than that of the cut before? */
+static bool is_new_range(const search *s, int k) { return k == 0 || s->low[s->open[k]] != s->low[s->open[k - 1]]; }
+
+/* Choose by how much the ranges with open cuts are divided; returns how many there are. */
+static int choose_ways(search *s)
+{
+  int num = 0;
+
+  for (int k = 0; k < s->num_open; k++) num += is_new_range(s, k);
+  s->ways = num > FEW_RANGES ? 2 : WAYS;
+  while ((uint64_t)s->ways > s->width) s->ways /= 2;
+  s->width /= (uint64_t)s->ways;
+  return num;
+}
+
+/* How many cells of this rank lie below the probes that divide the ranges. */
+static void probe(search *s)
 {
   int64_t at  = 0;
   int     num = 0;
 
-  for (int k = 0; k < s->num_open; k++) {
-    const uint64_t low = s->low[s->open[k]];
-
-    if (k > 0 && low == s->low[s->open[k - 1]]) continue;
-    for (int j = 0; j < WAYS - 1; j++)
-      s->below[num * (WAYS - 1) + j] = at = num_below(s, at, low + (uint64_t)(j + 1) * s->width);
-    num++;
-  }
-  return num;
+  for (int k = 0; k < s->num_open; k++)
+    for (int j = 1; j < s->ways && is_new_range(s, k); j++)
+      s->below[num++] = at = num_below(s, at, s->low[s->open[k]] + (uint64_t)j * s->width);
 }
 
 /* Move a cut to the part of its range that ends at the first probe above its goal; found: to that end of the part which is
  * nearer to the goal, if that is near enough. A greater goal never leads to a lower key. */
-static bool narrow(search *s, int cut, const int64_t below[WAYS - 1])
+static bool narrow(search *s, int cut, const int64_t *below)
 {
   int     part = 0;
   int64_t under, over;
 
-  while (part < WAYS - 1 && below[part] <= s->goal[cut]) part++;
+  while (part < s->ways - 1 && below[part] <= s->goal[cut]) part++;
   s->low[cut] += (uint64_t)part * s->width;
   under = part > 0 ? s->goal[cut] - below[part - 1] : INT64_MAX;
-  over  = part < WAYS - 1 ? below[part] - s->goal[cut] : INT64_MAX;
+  over  = part < s->ways - 1 ? below[part] - s->goal[cut] : INT64_MAX;
   if (over < under && over <= s->slack) {
     s->low[cut] += s->width;
     return true;
@@ -178,18 +187,19 @@ static bool narrow(search *s, int cut, const int64_t below[WAYS - 1])
 /* One round. */
 static remap_status narrow_all(const rm_comm *comm, search *s)
 {
-  int      num = 0, range = -1;
-  uint64_t last = 0;
+  const int num_ranges = choose_ways(s);
+  int       num = 0, range = -1;
+  uint64_t  last = 0;
 
-  s->width /= WAYS;
-  RM_TRY(rm_comm_sum_i64(comm, s->below, probe(s) * (WAYS - 1)));
+  probe(s);
+  RM_TRY(rm_comm_sum_i64(comm, s->below, num_ranges * (s->ways - 1)));
   for (int k = 0; k < s->num_open; k++) {
     const int      cut = s->open[k];
     const uint64_t low = s->low[cut];
 
     if (range < 0 || low != last) range++;
     last = low;
-    if (!narrow(s, cut, s->below + (int64_t)range * (WAYS - 1))) s->open[num++] = cut;
+    if (!narrow(s, cut, s->below + (int64_t)range * (s->ways - 1))) s->open[num++] = cut;
   }
   s->num_open = num;
   return REMAP_OK;
@@ -219,7 +229,7 @@ remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_f
   s.num_open = s.num_cuts;
   s.slack    = total / comm->size / SLACK;
   s.width    = UINT64_C(1) << RM_KEY_BITS;
-  for (int round = 0; round < ROUNDS && s.num_open > 0; round++) RM_TRY(narrow_all(comm, &s));
+  while (s.width > 1 && s.num_open > 0) RM_TRY(narrow_all(comm, &s));
   for (int i = 1; i < s.num_cuts; i++) RM_ASSERT(s.low[i - 1] <= s.low[i]);
   *out = (rm_cuts){s.num_cuts, s.low};
   return REMAP_OK;

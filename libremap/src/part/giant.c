@@ -1,6 +1,6 @@
 /* giant -- a cell that meets more than one in GIANT_SHARE times the ranks of the other mesh's cells would bring them all to its
- * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from the coarse boxes of the
- * other mesh's tags, of which every rank knows all: O(n log B) time for n tags and B boxes, at most RM_ZONE_BOXES per rank. */
+ * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from crowds of the other mesh's
+ * tags: O(n log B) time for n tags and B crowds that are near. */
 #include "part/part_private.h"
 
 #include <string.h>
@@ -33,14 +33,13 @@ static int add_crowd(void *user, rm_lid item)
   return 0;
 }
 
-/* Mark the giants of a side among this rank's tags, held against the crowds of the other side; returns how many there are. */
-static int64_t mark_giants(const rm_comm *comm, const rm_crowds *other, int side, rm_tags *tags)
+/* Mark the giants of a side among this rank's tags, held against the crowds of the other side, which has `total` tags; returns
+ * how many there are. */
+static int64_t mark_giants(const rm_comm *comm, const rm_crowds *other, int64_t total, int side, rm_tags *tags)
 {
-  double  total = 0, most;
+  double  most  = (double)total / ((double)GIANT_SHARE * comm->size);
   int64_t found = 0;
 
-  for (rm_lid g = 0; g < other->num; g++) total += other->crowd[g].num;
-  most = total / ((double)GIANT_SHARE * comm->size);
   if (most < FEW_CELLS) most = FEW_CELLS;
   for (rm_lid k = 0; k < tags->num[side]; k++) {
     tally t = {other, tags->box[side][k], 0};
@@ -86,16 +85,20 @@ remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *g
 
 remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out)
 {
-  int64_t     *offset = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset), num = 0;
-  rm_giant    *mine   = NULL;
+  int64_t     *offset   = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset), num = 0;
+  int64_t      total[2] = {tags->num[0], tags->num[1]};
+  rm_giant    *mine     = NULL;
   rm_crowds    crowds[2];
   void        *all;
-  remap_status status = offset ? REMAP_OK : REMAP_NO_MEMORY;
+  remap_status status   = offset ? REMAP_OK : REMAP_NO_MEMORY;
 
   RM_TRY(rm_comm_agree(comm, status, NULL));
   RM_ASSERT(offset);
-  for (int side = 0; side < 2; side++) RM_TRY(rm_part_crowds(scratch, comm, tags, side, &crowds[side]));
-  for (int side = 0; side < 2; side++) num += mark_giants(comm, &crowds[1 - side], side, tags);
+  RM_TRY(rm_comm_sum_i64(comm, total, 2));
+  for (int side = 0; side < 2; side++)
+    RM_TRY(rm_part_crowds(scratch, comm, tags, side, tags->num[1 - side], (const double(*)[6])tags->box[1 - side],
+                          RM_SOME_CROWDS, &crowds[side]));
+  for (int side = 0; side < 2; side++) num += mark_giants(comm, &crowds[1 - side], total[1 - side], side, tags);
   RM_TRY(rm_comm_agree(comm, list_giants(scratch, tags, num, &mine), NULL));
   RM_TRY(rm_comm_allgatherv(comm, arena, mine, num, sizeof *mine, offset, &all));
   return rm_comm_agree(comm, rm_part_know_giants(arena, offset[comm->size], all, out), NULL);

@@ -2,7 +2,7 @@
  * far smaller than the cell with its faces: tags are sorted along the Morton curve over all ranks, and only then cells move.
  *
  *   tag      tags of the zone's cells go to the ranks in whose interval of keys they lie, at first of equal numbers (cut)
- *   crowd    coarse boxes tell every rank where the others' tags are
+ *   crowd    coarse boxes tell a rank where tags are that may meet its own
  *   giant    the cells that meet a large part of the other mesh are found, and known to all ranks
  *   weigh    estimates the work that each cell's pairs make; intervals of equal work are cut, and the tags move on
  *   match    every rank lists the cells its blocks need, and asks their homes for those of other ranks
@@ -83,20 +83,6 @@ typedef struct rm_giants {
   const rm_boxtree *tree;     /* over them                                        */
 } rm_giants;
 
-/* Boxes that together hold all tags of one side on every rank. */
-typedef struct rm_crowd {
-  double  box[6];
-  int64_t rank;
-  double  num; /* tags in it, about */
-} rm_crowd;
-
-typedef struct rm_crowds {
-  rm_lid            num;
-  const rm_crowd   *crowd;    /* [num]     */
-  const double    (*box)[6];  /* [num]     */
-  const rm_boxtree *tree;     /* over them */
-} rm_crowds;
-
 /* A source tag of another seat that may meet a target here. */
 typedef struct rm_visitor {
   int32_t home_rank;
@@ -145,8 +131,9 @@ remap_status rm_part_send_tags(rm_arena *arena, rm_arena *scratch, const rm_comm
 remap_status rm_part_move_tags(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_cuts *cuts, rm_tags *out,
                                rm_reason *reason);
 
-/* Boxes around the tags of a side that are no giants. Collective. *out lives in arena. */
-remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_crowds *out);
+/* Crowds of the tags of a side that are no giants, as rm_crowds_meet. Collective. *out lives in arena. */
+remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int side, rm_lid num_asking,
+                            const double (*asking)[6], rm_lid most, rm_crowds *out);
 
 /* The source tags of other ranks, but for giants, that meet a crowd of this rank's targets. Collective. *out lives in arena,
  * with what is needed on the way. TOO_LARGE. */

@@ -1,19 +1,14 @@
-/* touch -- which cells of a mesh meet which rank's cells of another, or of the same. Every rank gathers the coarse boxes of
- * what every rank holds; the boxes of the cells that meet those travel there, are held against the cells themselves, and the
- * answers come back. So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
+/* touch -- which cells of a mesh meet which rank's cells of another, or of the same. A rank learns of crowds of what others
+ * hold; the boxes of the cells that meet those travel there, are held against the cells themselves, and the answers come back.
+ * So no cell is sent in vain, for 49 bytes per candidate. O(n log n) time. */
 #include "part/part_private.h"
 
-/* Where the targets are: those of this rank by box, those of all ranks by groups. */
+/* Where the targets are: those of this rank by box, those of others by crowds. */
 typedef struct targets {
   int64_t          *recv_offset;             /* [comm->size + 1]                            */
   const double    (*box)[6];                 /* [recv_offset[comm->size]] of this rank's    */
   const rm_boxtree *tree;                    /* over them                                   */
-  double            mine[RM_ZONE_BOXES][6];  /* groups of them                              */
-  int               num_mine;
-  int64_t          *group_offset;            /* [comm->size + 1] groups of each rank        */
-  const double    (*group)[6];               /* [group_offset[comm->size]]                  */
-  int              *group_rank;              /* [group_offset[comm->size]]                  */
-  const rm_boxtree *group_tree;              /* over all ranks' groups                      */
+  rm_crowds         crowds;                  /* of these and of other ranks' targets        */
 } targets;
 
 /* Send the boxes of a route's cells along it. Collective. recv_offset and *box live in arena. */
@@ -35,33 +30,30 @@ static remap_status send_boxes(rm_arena *arena, const rm_comm *comm, const rm_me
   return REMAP_OK;
 }
 
-/* The tree and the groups of this rank's targets. Not collective. */
-static remap_status group_targets(rm_arena *arena, const rm_comm *comm, targets *t, rm_reason *reason)
+/* The tree over this rank's targets. Not collective. */
+static remap_status plant(rm_arena *arena, const rm_comm *comm, targets *t, rm_reason *reason)
 {
   const int64_t num = t->recv_offset[comm->size];
 
   if (num > INT32_MAX)
     return rm_fail(REMAP_TOO_LARGE, reason, REMAP_TARGET, -1, "%lld cells come to one rank; use more ranks", (long long)num);
-  RM_TRY(rm_boxtree_build(arena, (rm_lid)num, t->box, &t->tree));
-  RM_TRY(rm_box_groups(arena, (rm_lid)num, t->box, rm_zone_boxes(comm->size), t->mine, &t->num_mine));
-  RM_NEW(t->group_offset, arena, (int64_t)comm->size + 1);
-  return REMAP_OK;
+  return rm_boxtree_build(arena, (rm_lid)num, t->box, &t->tree);
 }
 
 /* What a source cell's query adds to: the ranks it has met. */
 typedef struct meeting {
-  const int *group_rank;
-  int64_t   *next;      /* [comm->size] how many cells meet a rank, or where the next one goes */
-  rm_lid    *last_cell; /* [comm->size] the cell that met a rank last                          */
-  rm_lid    *list;      /* where the cells go, or NULL to count                                */
-  rm_lid     cell;      /* the one that asks                                                   */
+  const rm_crowds *crowds;
+  int64_t         *next;      /* [comm->size] how many cells meet a rank, or where the next one goes */
+  rm_lid          *last_cell; /* [comm->size] the cell that met a rank last                          */
+  rm_lid          *list;      /* where the cells go, or NULL to count                                */
+  rm_lid           cell;      /* the one that asks                                                   */
 } meeting;
 
-/* A source cell meets a group: it meets the group's rank, which counts once however many of its groups it meets. */
+/* A source cell meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
 static int meet_rank(void *user, rm_lid item)
 {
-  meeting   *m    = user;
-  const int  rank = m->group_rank[item];
+  meeting      *m    = user;
+  const int64_t rank = m->crowds->crowd[item].rank;
 
   if (m->last_cell[rank] == m->cell) return 0;
   m->last_cell[rank] = m->cell;
@@ -70,42 +62,35 @@ static int meet_rank(void *user, rm_lid item)
   return 0;
 }
 
-/* Every source cell of the zone asks which groups it meets. */
-static void meet_all(const rm_comm *comm, const targets *t, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
+/* Every source cell of the zone asks which crowds it meets. */
+static void meet_all(const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
 {
   for (int r = 0; r < comm->size; r++) m->last_cell[r] = -1;
   for (rm_lid k = 0; k < zone->num_cells[REMAP_SOURCE]; k++) {
     m->cell = zone->cell[REMAP_SOURCE][k];
-    (void)rm_boxtree_query(t->group_tree, t->group, mesh->cell_box[m->cell], meet_rank, m);
+    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, mesh->cell_box[m->cell], meet_rank, m);
   }
 }
 
-/* The source cells that meet a group of a rank's targets: counted in a first walk, listed in a second, so that the list needs
+/* The source cells that meet a crowd of a rank's targets: counted in a first walk, listed in a second, so that the list needs
  * no more room than it has entries. Not collective. */
-static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, targets *t,
-                                    rm_route *route)
+static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone,
+                                    const rm_crowds *crowds, rm_route *route)
 {
-  const int64_t num_groups = t->group_offset[comm->size];
-  meeting       m          = {0};
+  meeting m = {.crowds = crowds};
 
-  RM_REQUIRE(num_groups <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_TRY(rm_boxtree_build(arena, (rm_lid)num_groups, t->group, &t->group_tree));
-  RM_NEW(t->group_rank, arena, num_groups);
   RM_NEW(m.last_cell, arena, comm->size);
   RM_NEW(m.next, arena, comm->size);
   RM_NEW0(route->offset, arena, (int64_t)comm->size + 1);
-  for (int r = 0; r < comm->size; r++)
-    for (int64_t g = t->group_offset[r]; g < t->group_offset[r + 1]; g++) t->group_rank[g] = r;
-  m.group_rank = t->group_rank;
 
   for (int r = 0; r < comm->size; r++) m.next[r] = 0;
-  meet_all(comm, t, mesh, zone, &m);
+  meet_all(comm, mesh, zone, &m);
   for (int r = 0; r < comm->size; r++) route->offset[r] = m.next[r];
   RM_NEW(route->cell, arena, rm_offsets(route->offset, comm->size));
 
   for (int r = 0; r < comm->size; r++) m.next[r] = route->offset[r];
   m.list = route->cell;
-  meet_all(comm, t, mesh, zone, &m);
+  meet_all(comm, mesh, zone, &m);
   return REMAP_OK;
 }
 
@@ -161,16 +146,14 @@ remap_status rm_part_touch(rm_arena *arena, const rm_comm *comm, const rm_mesh *
   const rm_mesh *source = mesh[REMAP_SOURCE];
   targets        t     = {0};
   rm_route       route = {0};
-  void          *group;
   remap_status   mine;
 
   RM_TRY(send_boxes(arena, comm, mesh[REMAP_TARGET], target, &t.recv_offset, &t.box));
-  mine = group_targets(arena, comm, &t, reason);
+  mine = plant(arena, comm, &t, reason);
   RM_TRY(rm_comm_agree_reason(comm, mine, reason));
-  RM_ASSERT(mine == REMAP_OK && t.group_offset);
-  RM_TRY(rm_comm_allgatherv(comm, arena, t.mine, t.num_mine, sizeof *t.mine, t.group_offset, &group));
-  t.group = group;
-  mine    = list_candidates(arena, comm, source, zone, &t, &route);
+  RM_ASSERT(mine == REMAP_OK);
+  RM_TRY(rm_crowds_meet(arena, comm, t.tree->num_items, t.box, source->num_cells, source->cell_box, RM_ALL_CROWDS, &t.crowds));
+  mine = list_candidates(arena, comm, source, zone, &t.crowds, &route);
   RM_TRY(rm_comm_agree(comm, mine, NULL));
   RM_ASSERT(mine == REMAP_OK);
   RM_TRY(ask(arena, comm, source, &t, &route));

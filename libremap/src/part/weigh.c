@@ -163,13 +163,46 @@ static void weigh_targets(const rm_tags *tags, const sources *s, int64_t *work)
 
 /* ---- faces of giants ---------------------------------------------------------------------------------------------- */
 
+/* The box of a face. */
+static void box_of_face(const rm_mesh *mesh, rm_lid face, double box[6])
+{
+  for (int a = 0; a < 3; a++) box[a] = INFINITY, box[a + 3] = -INFINITY;
+  for (int64_t k = mesh->face_offset[face]; k < mesh->face_offset[face + 1]; k++)
+    for (int a = 0; a < 3; a++) {
+      box[a]     = fmin(box[a], mesh->node_xyz[mesh->face_node[k]][a]);
+      box[a + 3] = fmax(box[a + 3], mesh->node_xyz[mesh->face_node[k]][a]);
+    }
+}
+
+/* The boxes of the faces of this rank's giants of one mesh. Not collective. */
+static remap_status list_faces(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_giants *giants,
+                               rm_lid *num, double (**box)[6])
+{
+  int64_t most = 0, n = 0;
+
+  for (int listing = 0; listing < 2; listing++) {
+    if (listing) RM_NEW(*box, scratch, most);
+    for (rm_lid g = 0; g < giants->num; g++) {
+      const rm_lid c = giants->giant[g].cell;
+
+      if (giants->giant[g].side != (int)mesh->side || giants->giant[g].home_rank != comm->rank) continue;
+      if (!listing) most += mesh->cell_face_offset[c + 1] - mesh->cell_face_offset[c];
+      for (int64_t i = mesh->cell_face_offset[c]; listing && i < mesh->cell_face_offset[c + 1]; i++)
+        box_of_face(mesh, mesh->cell_face[i], (*box)[n++]);
+    }
+  }
+  RM_REQUIRE(n <= INT32_MAX, REMAP_TOO_LARGE);
+  *num = (rm_lid)n;
+  return REMAP_OK;
+}
+
 /* A face of a giant meets the crowds of some ranks, each of which counts once. */
 typedef struct meeting {
   const rm_crowds *crowds;
   int64_t         *next;      /* [comm->size] how many faces meet a rank, or where the next one goes */
-  int64_t         *last_face; /* [comm->size] the face that met a rank last                          */
+  rm_lid          *last_face; /* [comm->size] the face that met a rank last                          */
   double         (*list)[6];  /* where the faces go, or NULL to count                                */
-  int64_t          face;
+  rm_lid           face;
   const double    *box;       /* its box */
 } meeting;
 
@@ -185,45 +218,30 @@ static int meet_rank(void *user, rm_lid item)
   return 0;
 }
 
-/* Every face of this rank's giants of one mesh asks which crowds it meets. */
-static void meet_all(const rm_comm *comm, const rm_mesh *mesh, const rm_giants *giants, meeting *m)
+/* Every face asks which crowds it meets. */
+static void meet_all(const rm_comm *comm, rm_lid num, const double (*box)[6], meeting *m)
 {
   for (int r = 0; r < comm->size; r++) m->last_face[r] = -1;
-  m->face = 0;
-  for (int64_t g = 0; g < giants->num; g++) {
-    const rm_lid c = giants->giant[g].cell;
-
-    if (giants->giant[g].side != (int)mesh->side || giants->giant[g].home_rank != comm->rank) continue;
-    for (int64_t i = mesh->cell_face_offset[c]; i < mesh->cell_face_offset[c + 1]; i++, m->face++) {
-      const rm_lid f      = mesh->cell_face[i];
-      double       box[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
-
-      for (int64_t k = mesh->face_offset[f]; k < mesh->face_offset[f + 1]; k++)
-        for (int a = 0; a < 3; a++) {
-          box[a]     = fmin(box[a], mesh->node_xyz[mesh->face_node[k]][a]);
-          box[a + 3] = fmax(box[a + 3], mesh->node_xyz[mesh->face_node[k]][a]);
-        }
-      m->box = box;
-      (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, box, meet_rank, m);
-    }
+  for (m->face = 0; m->face < num; m->face++) {
+    m->box = box[m->face];
+    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, m->box, meet_rank, m);
   }
 }
 
-/* The boxes of the faces of this rank's giants of one mesh, by the ranks whose tags of the other mesh they may meet; offset is
- * [comm->size + 1]. Not collective. */
-static remap_status list_faces(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_giants *giants,
-                               const rm_crowds *crowds, int64_t *offset, double (**box)[6])
+/* The boxes of faces by the ranks whose crowds they meet; offset is [comm->size + 1]. Not collective. */
+static remap_status deal_faces(rm_arena *scratch, const rm_comm *comm, rm_lid num, const double (*box)[6],
+                               const rm_crowds *crowds, int64_t *offset, double (**out)[6])
 {
   meeting m = {.crowds = crowds};
 
   RM_NEW0(m.next, scratch, comm->size);
   RM_NEW(m.last_face, scratch, comm->size);
-  meet_all(comm, mesh, giants, &m);
+  meet_all(comm, num, box, &m);
   for (int r = 0; r < comm->size; r++) offset[r] = m.next[r];
-  RM_NEW(*box, scratch, rm_offsets(offset, comm->size));
+  RM_NEW(*out, scratch, rm_offsets(offset, comm->size));
   for (int r = 0; r < comm->size; r++) m.next[r] = offset[r];
-  m.list = *box;
-  meet_all(comm, mesh, giants, &m);
+  m.list = *out;
+  meet_all(comm, num, box, &m);
   return REMAP_OK;
 }
 
@@ -238,15 +256,17 @@ static remap_status bring_faces(rm_arena *scratch, const rm_comm *comm, const rm
 {
   int64_t     *offset  = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
   int64_t     *arrived = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *arrived), num;
-  double     (*box)[6] = NULL;
+  double     (*own)[6] = NULL, (*dealt)[6] = NULL;
+  rm_lid       num_own = 0;
   void        *recv;
   rm_crowds    crowds;
-  remap_status status;
+  remap_status status = offset && arrived ? list_faces(scratch, comm, mesh, giants, &num_own, &own) : REMAP_NO_MEMORY;
 
-  RM_TRY(rm_part_crowds(scratch, comm, tags, 1 - (int)mesh->side, &crowds));
-  status = offset && arrived ? list_faces(scratch, comm, mesh, giants, &crowds, offset, &box) : REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *box, offset, box, arrived, &recv));
+  RM_TRY(rm_part_crowds(scratch, comm, tags, 1 - (int)mesh->side, num_own, (const double(*)[6])own, RM_ALL_CROWDS, &crowds));
+  status = deal_faces(scratch, comm, num_own, (const double(*)[6])own, &crowds, offset, &dealt);
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *dealt, offset, dealt, arrived, &recv));
   num      = arrived[comm->size];
   out->box = recv;
   status   = num > INT32_MAX ? REMAP_TOO_LARGE : rm_boxtree_build(scratch, (rm_lid)num, out->box, &out->tree);

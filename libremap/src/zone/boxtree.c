@@ -171,7 +171,8 @@ remap_status rm_boxtree_build(rm_arena *arena, rm_lid n, const double (*box)[6],
 }
 
 /* Leaves of at most n / m items, rounded up, are reached by log2 m halvings at the latest, m the power of two up to `most`. */
-remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], int *num_groups)
+remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], rm_lid *group_of,
+                           int *num_groups)
 {
   rm_lid leaf_items = n;
   builder      b;
@@ -182,6 +183,7 @@ remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], 
   for (rm_lid node = 0; node < b.num_nodes; node++)
     if (b.count[node] > 0) {
       RM_ASSERT(num < most);
+      for (rm_lid k = b.first[node]; group_of && k < b.first[node] + b.count[node]; k++) group_of[b.place[k].item] = num;
       box_copy(group[num++], b.box[node]);
     }
   *num_groups = num;

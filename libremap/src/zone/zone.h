@@ -1,21 +1,10 @@
 /* zone -- two meshes in; out which of their cells can meet the other mesh at all (the overlap zone). What can never meet is
- * left behind and counted. Coarse: boxes of groups of cells are gathered, at most RM_ZONE_BOXES per rank and mesh, and fewer
- * where there are very many ranks. O(n log B) time for n cells here and B boxes. */
+ * left behind and counted. Coarse: ranks learn of each other's cells by boxes around groups of them, crowds, and only of those
+ * that they meet. O(n log B) time for n cells here and B crowds. */
 #ifndef RM_ZONE_H
 #define RM_ZONE_H
 
 #include "mesh/mesh.h"
-
-enum { RM_ZONE_BOXES = 64, RM_ZONE_ALL_BOXES = 1 << 16 };
-
-/* How many boxes a rank may have, for no more than RM_ZONE_ALL_BOXES or one per rank to be gathered: some megabytes on 10^5
- * ranks. */
-static inline int rm_zone_boxes(int num_ranks)
-{
-  const int most = RM_ZONE_ALL_BOXES / num_ranks;
-
-  return most > RM_ZONE_BOXES ? RM_ZONE_BOXES : most > 1 ? most : 1;
-}
 
 /* True if two boxes have a point in common; touching is enough. */
 static inline bool rm_box_meets(const double a[6], const double b[6])
@@ -47,9 +36,36 @@ int rm_boxtree_query_segment(const rm_boxtree *tree, const double (*item_box)[6]
 bool rm_boxtree_meets(const rm_boxtree *tree, const double (*item_box)[6], const double box[6]);
 
 /* The boxes of at most `most` groups of neighbouring items that together hold all n boxes, in numbers that differ by a factor
- * of two at most: group is [most][6], *num_groups is 0 only if n is. Not collective. Working memory from scratch. O(n log
- * most). */
-remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], int *num_groups);
+ * of two at most: group is [most][6], group_of [n] tells the group of each item and may be NULL, *num_groups is 0 only if n is.
+ * Not collective. Working memory from scratch. O(n log most). */
+remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], int most, double (*group)[6], rm_lid *group_of,
+                           int *num_groups);
+
+/* A crowd: boxes of a rank that lie side by side, by one around them. */
+typedef struct rm_crowd {
+  double  box[6];
+  double  num;  /* boxes in it, about                      */
+  int64_t rank; /* whose they are; if it is joined, of some */
+} rm_crowd;
+
+/* Crowds that this rank knows of. Read-only once built. */
+typedef struct rm_crowds {
+  rm_lid            num, num_own; /* this rank's come first */
+  const rm_crowd   *crowd;        /* [num]                  */
+  const double    (*box)[6];      /* [num] of each          */
+  const rm_boxtree *tree;         /* over them              */
+} rm_crowds;
+
+/* A rank makes no more crowds than RM_CROWDS. Where it does not matter whose they are, it learns of no more than
+ * RM_SOME_CROWDS, however many ranks and whatever lies on them; otherwise of RM_ALL_CROWDS. */
+enum { RM_CROWDS = 64, RM_SOME_CROWDS = 4096, RM_ALL_CROWDS = INT32_MAX };
+
+/* Group the boxes that every rank has, and tell each rank which crowds its asking boxes may meet: all that they meet, with
+ * others. Neighbouring crowds of other ranks are joined so that no more than `most` are left, though one may then span what
+ * asks nothing. Collective; messages to log2 P ranks, and what a rank takes in follows from what it asks for and not from how
+ * many ranks there are. *out lives in arena. TOO_LARGE if a rank cannot number them. */
+remap_status rm_crowds_meet(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6], rm_lid num_asking,
+                            const double (*asking)[6], rm_lid most, rm_crowds *out);
 
 /* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */
 typedef struct rm_zone {

@@ -1,0 +1,250 @@
+/* crowds -- who of all ranks is near, without everybody's boxes on everybody.
+ *
+ * The ranks are halved into blocks again and again, down to single ones. A rank knows boxes around all that its block asks
+ * about, on every level, and of the block beside it, so log2 P times RM_CROWDS of them:
+ *
+ *     level 0   [ 0 1 2 3 | 4 5 6 ]     rank 1 and rank 5 tell each other of the whole left and the whole right block,
+ *     level 1   [ 0 1 | 2 3 ]           rank 1 and rank 3 of a quarter,
+ *     level 2   [ 0 | 1 ]               rank 0 and rank 1 of themselves: from the lowest level up.
+ *
+ * Then crowds go down: on each level a rank hands to its partner what meets the partner's block, its own crowds and those that
+ * came so far, and keeps what meets its own. A crowd so comes on one path to each rank that it may meet, and what a rank holds
+ * on the way is shared evenly within a block. In a block of odd size the last rank of the smaller half has two partners, of
+ * which the second gives and gets no crowds: it has no counterpart.
+ *
+ * O(n log RM_CROWDS) time for n boxes, 2 log2 P messages, mostly. */
+#include "zone/zone.h"
+
+#include <string.h>
+
+enum { MOST_LEVELS = 32 };
+
+/* Boxes around all that a block asks about. */
+typedef struct region {
+  int64_t       num;
+  const double (*box)[6];
+} region;
+
+typedef struct meeting {
+  rm_arena      *scratch;
+  const rm_comm *comm;
+  int            num_levels;
+  int            num_with[MOST_LEVELS], with[MOST_LEVELS][2]; /* [level] partners                          */
+  region         own[MOST_LEVELS + 1];  /* [level] of the block halved there, from 1; at last of this rank   */
+  region         other[MOST_LEVELS];    /* [level] of the half that this rank is not in                      */
+  int64_t        num_own, num;
+  rm_crowd      *own_crowd;             /* [num_own]                                                         */
+  rm_crowd      *crowd;                 /* [num] of other ranks                                              */
+  remap_status   failed;                /* what this rank failed in: it goes on with less, for others wait   */
+} meeting;
+
+/* The partners on every level. */
+static void halve(meeting *m)
+{
+  int first = 0, end = m->comm->size;
+
+  while (end - first > 1) {
+    const int left = (end - first + 1) / 2, middle = first + left, right = end - middle, level = m->num_levels++;
+    const int rank = m->comm->rank, i = rank < middle ? rank - first : rank - middle;
+
+    m->num_with[level] = 1;
+    if (rank < middle) {
+      m->with[level][0] = middle + (i < right ? i : right - 1);
+      end               = middle;
+    } else {
+      m->with[level][0] = first + i;
+      if (i == right - 1 && left > right) m->with[level][m->num_with[level]++] = first + left - 1;
+      first = middle;
+    }
+  }
+}
+
+/* A rank that fails does its part of the messages all the same, with nothing in them; unless these fail. */
+static remap_status go_on(meeting *m, remap_status status)
+{
+  if (status == REMAP_OK || status == REMAP_MPI_FAILURE) return status;
+  m->failed = status;
+  return REMAP_OK;
+}
+
+/* ---- what is asked about ------------------------------------------------------------------------------------------ */
+
+static remap_status group(rm_arena *scratch, rm_lid n, const double (*box)[6], region *out)
+{
+  double (*around)[6];
+  int    num = 0;
+
+  RM_NEW(around, scratch, RM_CROWDS);
+  RM_TRY(rm_box_groups(scratch, n, box, RM_CROWDS, around, NULL, &num));
+  *out = (region){num, (const double(*)[6])around};
+  return REMAP_OK;
+}
+
+static remap_status unite(rm_arena *scratch, const region *a, const region *b, region *out)
+{
+  double (*both)[6];
+
+  RM_NEW(both, scratch, a->num + b->num);
+  if (a->num > 0) memcpy(both, a->box, (size_t)a->num * sizeof *both);
+  if (b->num > 0) memcpy(both + a->num, b->box, (size_t)b->num * sizeof *both);
+  return group(scratch, (rm_lid)(a->num + b->num), (const double(*)[6])both, out);
+}
+
+/* Learn what the blocks ask about, from the lowest level up. */
+static remap_status climb(meeting *m)
+{
+  for (int level = m->num_levels - 1; level >= 0; level--) {
+    const region *own = &m->own[level + 1];
+    region       *other = &m->other[level];
+
+    for (int k = 0; k < m->num_with[level]; k++) { /* both know the same */
+      void *recv;
+
+      RM_TRY(go_on(m, rm_comm_swap(m->comm, m->scratch, m->with[level][k], sizeof *own->box, own->num, own->box, &other->num,
+                                   &recv)));
+      other->box = recv;
+    }
+    if (level > 0) RM_TRY(go_on(m, unite(m->scratch, own, other, &m->own[level])));
+  }
+  return REMAP_OK;
+}
+
+/* ---- crowds ------------------------------------------------------------------------------------------------------- */
+
+/* This rank's crowds. */
+static remap_status make_crowds(meeting *m, rm_lid n, const double (*box)[6])
+{
+  region made;
+
+  RM_TRY(group(m->scratch, n, box, &made));
+  RM_NEW(m->own_crowd, m->scratch, made.num);
+  m->num_own = made.num;
+  for (int64_t g = 0; g < made.num; g++) {
+    m->own_crowd[g] = (rm_crowd){.num = (double)n / (double)made.num, .rank = m->comm->rank};
+    memcpy(m->own_crowd[g].box, made.box[g], sizeof *made.box);
+  }
+  return REMAP_OK;
+}
+
+/* Copy the crowds that meet a region; returns their number. */
+static int64_t take(const region *r, int64_t n, const rm_crowd *crowd, rm_crowd *out)
+{
+  int64_t num = 0;
+
+  for (int64_t k = 0; k < n; k++) {
+    int64_t i = 0;
+
+    while (i < r->num && !rm_box_meets(crowd[k].box, r->box[i])) i++;
+    if (i < r->num) out[num++] = crowd[k];
+  }
+  return num;
+}
+
+/* The boxes of crowds, side by side. */
+static remap_status boxes_of(rm_arena *arena, int64_t n, const rm_crowd *crowd, const double (**out)[6])
+{
+  double (*box)[6];
+
+  RM_REQUIRE(n <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(box, arena, n);
+  for (int64_t k = 0; k < n; k++) memcpy(box[k], crowd[k].box, sizeof *box);
+  *out = (const double(*)[6])box;
+  return REMAP_OK;
+}
+
+/* Join the crowds of other ranks to `most`. */
+static remap_status join(meeting *m, rm_lid most)
+{
+  const double (*box)[6];
+  double       (*around)[6];
+  rm_lid        *group_of;
+  rm_crowd      *joined;
+  int            num;
+
+  RM_TRY(boxes_of(m->scratch, m->num, m->crowd, &box));
+  RM_NEW(around, m->scratch, most);
+  RM_NEW(group_of, m->scratch, m->num);
+  RM_TRY(rm_box_groups(m->scratch, (rm_lid)m->num, box, most, around, group_of, &num));
+  RM_NEW0(joined, m->scratch, num);
+  for (int64_t k = 0; k < m->num; k++) {
+    joined[group_of[k]].num += m->crowd[k].num;
+    joined[group_of[k]].rank = m->crowd[k].rank;
+  }
+  for (int g = 0; g < num; g++) memcpy(joined[g].box, around[g], sizeof *around);
+  m->num   = num;
+  m->crowd = joined;
+  return REMAP_OK;
+}
+
+/* What stays of the crowds of other ranks, and what came. */
+static remap_status keep(meeting *m, const region *own, const int64_t num_came[2], void *const came[2], rm_lid most)
+{
+  rm_crowd *kept;
+  int64_t   num;
+
+  RM_NEW(kept, m->scratch, m->num + num_came[0] + num_came[1]);
+  num = take(own, m->num, m->crowd, kept);
+  for (int k = 0; k < 2; k++) {
+    if (num_came[k] > 0) memcpy(kept + num, came[k], (size_t)num_came[k] * sizeof *kept);
+    num += num_came[k];
+  }
+  m->num   = num;
+  m->crowd = kept;
+  return num > most ? join(m, most) : REMAP_OK;
+}
+
+/* Hand crowds on, from the highest level down. */
+static remap_status descend(meeting *m, rm_lid most)
+{
+  for (int level = 0; level < m->num_levels; level++) {
+    rm_crowd *out = rm_arena_alloc(m->scratch, m->num_own + m->num, sizeof *out);
+    int64_t   num = 0, num_came[2] = {0, 0};
+    void     *came[2] = {NULL, NULL};
+
+    if (out) {
+      num = take(&m->other[level], m->num_own, m->own_crowd, out);
+      num += take(&m->other[level], m->num, m->crowd, out + num);
+    } else {
+      m->failed = REMAP_NO_MEMORY;
+    }
+    for (int k = 0; k < m->num_with[level]; k++)
+      RM_TRY(go_on(m, rm_comm_swap(m->comm, m->scratch, m->with[level][k], sizeof *out, k == 0 ? num : 0, out, &num_came[k],
+                                   &came[k])));
+    RM_TRY(go_on(m, keep(m, &m->own[level + 1], num_came, came, most)));
+  }
+  return m->failed;
+}
+
+/* The crowds of this rank, then those of others. Not collective. */
+static remap_status put_out(rm_arena *arena, const meeting *m, rm_crowds *out)
+{
+  const int64_t num = m->num_own + m->num;
+  rm_crowd     *crowd;
+
+  RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
+  RM_NEW(crowd, arena, num);
+  if (m->num_own > 0) memcpy(crowd, m->own_crowd, (size_t)m->num_own * sizeof *crowd);
+  if (m->num > 0) memcpy(crowd + m->num_own, m->crowd, (size_t)m->num * sizeof *crowd);
+  *out = (rm_crowds){.num = (rm_lid)num, .num_own = (rm_lid)m->num_own, .crowd = crowd};
+  RM_TRY(boxes_of(arena, num, crowd, &out->box));
+  return rm_boxtree_build(arena, out->num, out->box, &out->tree);
+}
+
+remap_status rm_crowds_meet(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6], rm_lid num_asking,
+                            const double (*asking)[6], rm_lid most, rm_crowds *out)
+{
+  meeting      m    = {.scratch = rm_arena_new(), .comm = comm, .failed = REMAP_OK};
+  remap_status mine = m.scratch ? make_crowds(&m, num_boxes, box) : REMAP_NO_MEMORY, status;
+
+  halve(&m);
+  if (mine == REMAP_OK && comm->size > 1) mine = group(m.scratch, num_asking, asking, &m.own[m.num_levels]);
+  RM_GOTO(done, status = rm_comm_agree(comm, mine, NULL));
+  RM_ASSERT(mine == REMAP_OK);
+  RM_GOTO(done, status = climb(&m));
+  mine = descend(&m, most);
+  if (mine == REMAP_OK) mine = put_out(arena, &m, out);
+  status = rm_comm_agree(comm, mine, NULL);
+done:
+  rm_arena_drop(m.scratch);
+  return status;
+}
