@@ -113,7 +113,8 @@ static remap_status number_faces(work *w, rm_arena *passing)
     key[f][3] = hash_of(w, at);
   }
   w->f.v.face_global = global;
-  return rm_super_number(passing, w->f.job->comm, w->f.v.num_faces, 4, &key[0][0], global, &w->f.v.global_faces);
+  return rm_super_number(passing, w->f.job->comm, w->f.v.num_faces, 4, &key[0][0], w->f.v.global_nodes, global,
+                         &w->f.v.global_faces);
 }
 
 /* ---- cells ------------------------------------------------------------------------------------------------------- */
@@ -160,7 +161,8 @@ static remap_status number_cells(work *w, rm_arena *passing)
   RM_ASSERT(key);
   sort_cells(w, key);
   w->f.v.cell_global = global;
-  return rm_super_number(passing, w->f.job->comm, w->f.v.num_cells, 1, key, global, &w->f.v.global_cells);
+  return rm_super_number(passing, w->f.job->comm, w->f.v.num_cells, 1, key, 2 * w->f.v.global_faces, global,
+                         &w->f.v.global_cells);
 }
 
 static remap_status make_cells(work *w, rm_super *out)

@@ -26,7 +26,7 @@ static int64_t name_at_vertex(const rm_soup *s, int64_t i)
 typedef struct corners {
   int64_t *place;  /* [corners of the soup]           */
   int64_t *global; /* [num] NULL: as here, on one rank */
-  int64_t  num;
+  int64_t  num, num_everywhere;
 } corners;
 
 /* A word that ascends as the coordinate does. */
@@ -65,7 +65,6 @@ static remap_status number_corners(const rm_finish *w, rm_arena *arena, corners 
   rm_soup      *s = w->soup;
   rm_arena     *passing  = rm_arena_new();
   uint64_t     *distinct = NULL;
-  int64_t       total;
   remap_status  status = REMAP_NO_MEMORY;
 
   c->place = rm_arena_alloc(arena, s->num_corners, sizeof *c->place);
@@ -73,7 +72,7 @@ static remap_status number_corners(const rm_finish *w, rm_arena *arena, corners 
   if (status == REMAP_OK && s->has_ranks) c->global = rm_arena_alloc(arena, c->num, sizeof *c->global);
   RM_GOTO(done, status = rm_comm_agree(w->job->comm, s->has_ranks && !c->global ? REMAP_NO_MEMORY : status, NULL));
   if (s->has_ranks)
-    status = rm_super_number(passing, w->job->comm, c->num, CORNER_WORDS, distinct, c->global, &total);
+    status = rm_super_number(passing, w->job->comm, c->num, CORNER_WORDS, distinct, 0, c->global, &c->num_everywhere);
   free(s->corner);
   s->corner = NULL;
 done:
@@ -153,7 +152,8 @@ static remap_status number_nodes(rm_finish *w, rm_arena *passing, const numberin
     for (int k = 2; k < RM_SOUP_CORNERS; k++) to[k] = global_of(&x->c, m->more[k - 2]);
   }
   w->v.node_global = global;
-  return rm_super_number(passing, w->job->comm, w->v.num_nodes, RM_SOUP_CORNERS, &key[0][0], global, &w->v.global_nodes);
+  return rm_super_number(passing, w->job->comm, w->v.num_nodes, RM_SOUP_CORNERS, &key[0][0], 4 * (x->c.num_everywhere + 1),
+                         global, &w->v.global_nodes);
 }
 
 /* Turn every loop of nodes until it begins with its least one. */

@@ -1,12 +1,13 @@
-/* number -- equal keys of all ranks get one number, in the order of the keys: each rank has its own in order, samples tell
- * where to cut, every key goes to the rank of its interval, is numbered there, and the number comes back. Words are sorted one
+/* number -- equal keys of all ranks get one number, in the order of the keys: each rank has its own in order, every key goes to
+ * the rank of its interval, is numbered there, and the number comes back. Where first words are numbers from 0 on, counts of
+ * them tell where to cut, the same number of counts on any number of ranks; elsewhere samples of the keys. Words are sorted one
  * after the other, and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
 #include "super/super_private.h"
 
 #include <string.h>
 
 /* Samples of a rank: so many, but of all ranks together not many more than ALL_SAMPLES, which every rank sorts. */
-enum { SAMPLES = 64, LEAST_SAMPLES = 4, ALL_SAMPLES = 1 << 19, FEW = 24 };
+enum { SAMPLES = 64, LEAST_SAMPLES = 4, ALL_SAMPLES = 1 << 19, BINS = 1024, FEW = 24 };
 
 typedef struct keys {
   int             words;
@@ -79,83 +80,135 @@ static int compare(const uint64_t *a, const uint64_t *b, int words)
 
 /* Several ranks: what each needs. */
 typedef struct dealing {
+  const rm_comm  *comm;
+  int             words;
   const uint64_t *key; /* [num][words] in order */
   int64_t         num;
-  int64_t  *send_offset, *recv_offset, *back_offset, *sample_offset; /* [size + 1] */
-  uint64_t  sample[SAMPLES * RM_SOUP_CORNERS];
-  int64_t   num_samples;
-  uint64_t *arrived;  /* keys of this rank's interval, and their numbers */
-  int64_t  *answer;
+  int64_t        *send_offset, *recv_offset, *back_offset; /* [size + 1] */
+  uint64_t       *arrived;  /* keys of this rank's interval, and their numbers */
+  int64_t        *answer;
 } dealing;
 
-static remap_status prepare(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, dealing *d)
+static remap_status prepare(rm_arena *passing, dealing *d)
 {
-  const int64_t share = ALL_SAMPLES / comm->size;
+  RM_NEW(d->send_offset, passing, (int64_t)d->comm->size + 1);
+  RM_NEW(d->recv_offset, passing, (int64_t)d->comm->size + 1);
+  RM_NEW(d->back_offset, passing, (int64_t)d->comm->size + 1);
+  d->send_offset[0]             = 0;
+  d->send_offset[d->comm->size] = d->num;
+  return REMAP_OK;
+}
+
+/* Rank r's interval begins at a key: the first `words` words of it. Those of lower ranks are cut. */
+static void cut_at(dealing *d, int r, const uint64_t *key, int words)
+{
+  int64_t low = d->send_offset[r - 1], high = d->num;
+
+  while (low < high) {
+    const int64_t middle = (low + high) / 2;
+
+    if (compare(d->key + middle * d->words, key, words) < 0) low = middle + 1;
+    else high = middle;
+  }
+  d->send_offset[r] = low;
+}
+
+/* Cut where first words are 0 .. range - 1, and lie evenly within each of BINS parts of that. Collective. */
+static remap_status cut_by_counts(dealing *d, int64_t range)
+{
+  const int64_t width = range / BINS + 1;
+  int64_t       below[BINS + 1] = {0};
+  int           bin = 0;
+
+  for (int64_t i = 0; i < d->num; i++) below[(int64_t)d->key[i * d->words] / width]++;
+  RM_TRY(rm_comm_sum_i64(d->comm, below, BINS));
+  rm_offsets(below, BINS);
+  for (int r = 1; r < d->comm->size; r++) {
+    const int64_t goal = below[BINS] / d->comm->size * r + below[BINS] % d->comm->size * r / d->comm->size;
+    uint64_t      word;
+
+    while (bin < BINS - 1 && below[bin + 1] <= goal) bin++;
+    word = (uint64_t)(bin * width);
+    if (below[bin + 1] > below[bin])
+      word += (uint64_t)((double)(goal - below[bin]) / (double)(below[bin + 1] - below[bin]) * (double)width);
+    cut_at(d, r, &word, 1);
+  }
+  return REMAP_OK;
+}
+
+/* Samples of the keys: this rank's, and everybody's in order. */
+typedef struct samples {
+  uint64_t mine[SAMPLES * RM_SOUP_CORNERS];
+  int64_t  num_mine;
+  int64_t *offset; /* [size + 1] */
+  void    *all;
+  keys     sorted;
+} samples;
+
+static remap_status take_samples(rm_arena *passing, const dealing *d, samples *s)
+{
+  const int64_t share = ALL_SAMPLES / d->comm->size;
   const int64_t most  = share > SAMPLES ? SAMPLES : share > LEAST_SAMPLES ? share : LEAST_SAMPLES;
 
-  d->key         = key;
-  d->num         = n;
-  d->num_samples = n < most ? n : most;
-  for (int64_t s = 0; s < d->num_samples; s++)
-    memcpy(d->sample + s * words, key + n * s / d->num_samples * words, sizeof *key * (size_t)words);
-  RM_NEW(d->send_offset, passing, (int64_t)comm->size + 1);
-  RM_NEW(d->recv_offset, passing, (int64_t)comm->size + 1);
-  RM_NEW(d->back_offset, passing, (int64_t)comm->size + 1);
-  RM_NEW(d->sample_offset, passing, (int64_t)comm->size + 1);
+  s->num_mine = d->num < most ? d->num : most;
+  for (int64_t i = 0; i < s->num_mine; i++)
+    memcpy(s->mine + i * d->words, d->key + d->num * i / s->num_mine * d->words, sizeof *d->key * (size_t)d->words);
+  RM_NEW(s->offset, passing, (int64_t)d->comm->size + 1);
   return REMAP_OK;
 }
 
-/* Where each rank's interval ends among the keys here: at the samples' quantiles. */
-static remap_status cut(rm_arena *passing, const rm_comm *comm, int words, uint64_t *sample, dealing *d)
+static remap_status sort_samples(rm_arena *passing, const dealing *d, samples *s)
 {
-  const int64_t num = d->sample_offset[comm->size];
-  keys          k;
+  const int64_t num = s->offset[d->comm->size];
 
-  RM_TRY(start(passing, num, words, sample, &k));
-  for (int64_t i = 0; i < num; i++) k.order[i].item = i;
-  if (num) sort_run(&k, 0, num, 0);
-  d->send_offset[0] = 0;
-  for (int r = 1; r < comm->size; r++) {
-    int64_t low = d->send_offset[r - 1], high = d->num;
+  RM_TRY(start(passing, num, d->words, s->all, &s->sorted));
+  for (int64_t i = 0; i < num; i++) s->sorted.order[i].item = i;
+  if (num) sort_run(&s->sorted, 0, num, 0);
+  return REMAP_OK;
+}
 
-    while (num && low < high) {
-      const int64_t middle = (low + high) / 2;
-      if (compare(d->key + middle * words, sample + k.order[num * r / comm->size].item * words, words) < 0)
-        low = middle + 1;
-      else high = middle;
-    }
-    d->send_offset[r] = low;
+/* Cut at the samples' quantiles. Collective. */
+static remap_status cut_by_samples(rm_arena *passing, dealing *d)
+{
+  const size_t size = sizeof *d->key * (size_t)d->words;
+  samples      s    = {.num_mine = 0};
+
+  RM_TRY(rm_comm_agree(d->comm, take_samples(passing, d, &s), NULL));
+  RM_TRY(rm_comm_allgatherv(d->comm, passing, s.mine, s.num_mine, size, s.offset, &s.all));
+  RM_TRY(rm_comm_agree(d->comm, sort_samples(passing, d, &s), NULL));
+  for (int r = 1; r < d->comm->size; r++) {
+    const int64_t num = s.offset[d->comm->size];
+
+    if (num > 0) cut_at(d, r, s.sorted.word + s.sorted.order[num * r / d->comm->size].item * d->words, d->words);
+    else d->send_offset[r] = 0;
   }
-  d->send_offset[comm->size] = d->num;
   return REMAP_OK;
 }
 
-static remap_status number_here(rm_arena *passing, const rm_comm *comm, int words, dealing *d, int64_t *num)
+static remap_status number_here(rm_arena *passing, dealing *d, int64_t *num)
 {
-  const int64_t n = d->recv_offset[comm->size];
+  const int64_t n = d->recv_offset[d->comm->size];
   keys          k;
 
-  RM_TRY(start(passing, n, words, d->arrived, &k));
+  RM_TRY(start(passing, n, d->words, d->arrived, &k));
   RM_NEW(d->answer, passing, n);
   *num = rank_keys(&k, n, d->answer);
   return REMAP_OK;
 }
 
-remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
-                             int64_t *total)
+remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t range,
+                             int64_t *number, int64_t *total)
 {
-  const size_t size = sizeof *key * (size_t)words;
-  dealing      d    = {0};
-  void        *samples = NULL, *arrived, *answers;
-  int64_t      here = 0, before;
+  dealing d    = {.comm = comm, .words = words, .key = key, .num = n};
+  int64_t here = 0, before;
+  void   *arrived, *answers;
 
   RM_ASSERT(comm->size > 1 && words <= RM_SOUP_CORNERS);
-  RM_TRY(rm_comm_agree(comm, prepare(passing, comm, n, words, key, &d), NULL));
-  RM_TRY(rm_comm_allgatherv(comm, passing, d.sample, d.num_samples, size, d.sample_offset, &samples));
-  RM_TRY(rm_comm_agree(comm, cut(passing, comm, words, samples, &d), NULL));
-  RM_TRY(rm_comm_exchange(comm, passing, size, d.send_offset, key, d.recv_offset, &arrived));
+  RM_TRY(rm_comm_agree(comm, prepare(passing, &d), NULL));
+  RM_TRY(range > 0 ? cut_by_counts(&d, range) : cut_by_samples(passing, &d));
+  RM_TRY(rm_comm_exchange(comm, passing, sizeof *key * (size_t)words, d.send_offset, key, d.recv_offset, &arrived));
   d.arrived = arrived;
-  RM_TRY(rm_comm_agree(comm, number_here(passing, comm, words, &d, &here), NULL));
+  RM_TRY(rm_comm_agree(comm, number_here(passing, &d, &here), NULL));
   before = here;
   RM_TRY(rm_comm_exscan_i64(comm, &before));
   for (int64_t i = 0; i < d.recv_offset[comm->size]; i++) d.answer[i] += before;

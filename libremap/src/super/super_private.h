@@ -123,9 +123,10 @@ remap_status rm_super_order(const rm_words *words, int64_t n, uint32_t *order);
 remap_status rm_super_rank(rm_arena *passing, int64_t n, int words, const uint64_t *key, int64_t *place, int64_t *num);
 
 /* Number n keys of `words` words each, key[n][words], which ascend on each rank, over all ranks: equal keys get one number,
- * from 0 without gaps, in their order. number is [n]. Collective, for more than one rank. Working memory from passing. O(n). */
-remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t *number,
-                             int64_t *total);
+ * from 0 without gaps, in their order. range: the first words are 0 .. range - 1, about as many of each; or 0: they are
+ * anything. number is [n]. Collective, for more than one rank. Working memory from passing. O(n). */
+remap_status rm_super_number(rm_arena *passing, const rm_comm *comm, int64_t n, int words, const uint64_t *key, int64_t range,
+                             int64_t *number, int64_t *total);
 
 /* Where a cell or face comes from. */
 typedef struct rm_origin {
