@@ -519,6 +519,34 @@ static void zones_that_touch_need_no_matching_faces(void)
   }
 }
 
+/* Two zones of boxes in tenths, whose edges meet in points of doubles. */
+static tm_mesh *patched_boxes(int side, uint64_t seed)
+{
+  double m[12] = {0};
+  int    n[2][3];
+
+  for (int k = 0; k < 3; k++) {
+    m[5 * k]     = .1 * (double)(tm_random(&seed, 100) + 1);
+    m[4 * k + 3] = .1 * (double)tm_random(&seed, 9);
+  }
+  seed += 10 * (uint64_t)side;
+  for (int k = 0; k < 6; k++) n[k / 3][k % 3] = 1 + (int)tm_random(&seed, 3);
+  return tm_two_zones(n[0], n[1], 0, tm_affine, m);
+}
+
+static void zones_of_boxes_are_joined_without_rounding(void)
+{
+  for (uint64_t k = 0; k < 150; k++) {
+    const plan p = {patched_boxes, 100 * k, k % 2, {UNION, 0, 0, 1}, false, false};
+    world      w;
+
+    open_world(&w, MPI_COMM_SELF, &p);
+    for (int64_t c = 0; c < w.v.num_cells; c++) RT_CHECK(w.v.cell_volume[c] > 1e-9);
+    if (w.status == REMAP_OK) is_the_union(&w);
+    close_world(&w);
+  }
+}
+
 static tm_mesh *by_a_little(int side, uint64_t seed)
 {
   const double phase = .3, gap = seed == 1 ? -1e-13 : seed == 2 ? 1e-13 : seed == 3 ? -3e-8 : -.05;
@@ -679,6 +707,7 @@ static void every_refusal_names_a_cell(void)
 RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothing_pass_through),
         RT_CASE(meshes_that_touch_in_every_way_are_the_same_on_any_ranks), RT_CASE(pieces_of_warped_faces_come_together),
         RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut),
-        RT_CASE(zones_that_touch_need_no_matching_faces), RT_CASE(zones_that_overlap_by_rounding_count_once),
+        RT_CASE(zones_that_touch_need_no_matching_faces), RT_CASE(zones_of_boxes_are_joined_without_rounding),
+        RT_CASE(zones_that_overlap_by_rounding_count_once),
         RT_CASE(zones_that_overlap_by_more_are_refused_by_name),
         RT_CASE(a_cell_without_thickness_on_half_a_face_is_not_there), RT_CASE(every_refusal_names_a_cell))

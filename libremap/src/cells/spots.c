@@ -93,10 +93,27 @@ bool rm_spot_meeting(const rm_limit *l, const rm_spot *spot, double line[2][3], 
 
 /* ---- coordinates ------------------------------------------------------------------------------------------------- */
 
-/* The spot in two parts, low what rounding took from xyz; *error is a bound of the error of each coordinate. */
+/* What rounding to lambda took from the parameter at which a line meets a plane. Some 150 ns. */
+static double parameter_tail(double line[2][3], double plane[3][3], double lambda)
+{
+  rm_dd side[2][3], reach[3], u[3], normal[3];
+
+  for (int c = 0; c < 3; c++) {
+    for (int h = 0; h < 2; h++) side[h][c] = rm_two_diff(plane[h + 1][c], plane[0][c]);
+    reach[c] = rm_two_diff(plane[0][c], line[0][c]);
+    u[c]     = rm_two_diff(line[1][c], line[0][c]);
+  }
+  rm_dd_cross(side[0], side[1], normal);
+  const rm_dd  den  = rm_dd_dot(normal, u);
+  const double tail = rm_dd_sub(rm_dd_dot(normal, reach), rm_dd_mul((rm_dd){lambda, 0}, den)).hi / den.hi;
+  return fabs(tail) < 0x1p-50 ? tail : 0; /* else it has no digits: the line is all but parallel */
+}
+
+/* The spot in two parts, low what rounding took from xyz; *error is a bound of the error of each coordinate. Where two edges
+ * meet in a point of doubles, as those of boxes do, it is that point: zones that touch in a plane do so when they are joined. */
 static void place(const rm_limit *l, const rm_spot *spot, double xyz[3], float low[3], float *error)
 {
-  double line[2][3], plane[3][3], size = 0, reach = 0;
+  double line[2][3], plane[3][3], tail = 0, size = 0, reach = 0;
 
   if (!rm_spot_meeting(l, spot, line, plane)) {
     memcpy(xyz, line[0], sizeof line[0]);
@@ -104,12 +121,13 @@ static void place(const rm_limit *l, const rm_spot *spot, double xyz[3], float l
     return;
   }
   const double lambda = rm_crossing_parameter(line[0], line[1], plane[0], plane[1], plane[2]);
+  if (spot->at[0].kind == RM_ON_EDGE && spot->at[1].kind == RM_ON_EDGE) tail = parameter_tail(line, plane, lambda);
   for (int c = 0; c < 3; c++) {
-    const double u = line[1][c] - line[0][c];
-    const rm_dd  x = rm_two_sum(line[0][c], lambda * u);
+    const rm_dd u = rm_two_diff(line[1][c], line[0][c]), way = rm_dd_mul((rm_dd){lambda, tail}, u);
+    const rm_dd x = rm_dd_add((rm_dd){line[0][c], 0}, way);
     xyz[c] = x.hi;
     low[c] = (float)x.lo;
-    size   = rm_max(size, fabs(u));
+    size   = rm_max(size, fabs(u.hi));
     reach  = rm_max(reach, rm_max(fabs(line[0][c]), fabs(line[1][c])));
   }
   *error = (float)rm_max(0x1.1p-48 * size + 0x1.1p-52 * reach, 0x1p-120); /* no smaller as a float */
