@@ -106,30 +106,6 @@ static void every_pair_of_cells_with_meeting_boxes_is_made_in_one_block_of_one_r
   for_all_worlds(check_pairs);
 }
 
-/* All blocks together have each cell of any block once. */
-static void check_union(world *w)
-{
-  for (int side = 0; side < 2; side++) {
-    rm_piece     all;
-    const rm_lid n    = (rm_lid)w->in.mesh[side]->num_global_cells; /* more than any rank has */
-    uint8_t     *here = rm_arena_zero(w->in.arena, (int64_t)n * w->in.comm.size, 1);
-    int64_t      num  = 0;
-
-    for (int block = 0; block < rm_part_blocks(w->routes); block++) {
-      rm_piece p;
-
-      RT_EQ(rm_part_take(w->in.arena, w->routes, w->stock[side], block, &p, &w->reason), REMAP_OK);
-      for (rm_lid c = 0; c < p.num_cells; c++) here[(int64_t)p.cell_home_rank[c] * n + p.cell_home[c]] = 1;
-    }
-    for (int64_t k = 0; k < (int64_t)n * w->in.comm.size; k++) num += here[k];
-    RT_EQ(rm_part_take(w->in.arena, w->routes, w->stock[side], RM_EVERY_BLOCK, &all, &w->reason), REMAP_OK);
-    RT_EQ(all.num_cells, num);
-    for (rm_lid c = 0; c < all.num_cells; c++) RT_EQ(here[(int64_t)all.cell_home_rank[c] * n + all.cell_home[c]], 1);
-  }
-}
-
-static void all_blocks_at_once_have_every_cell_of_any_block_once(void) { for_all_worlds(check_union); }
-
 static int64_t most_blocks(int kind, rm_slicing slicing)
 {
   int64_t num;
@@ -155,4 +131,4 @@ static void sources_that_meet_everything_make_one_block(void)
 }
 
 RT_MAIN(RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_in_one_block_of_one_rank),
-        RT_CASE(all_blocks_at_once_have_every_cell_of_any_block_once), RT_CASE(sources_that_meet_everything_make_one_block))
+        RT_CASE(sources_that_meet_everything_make_one_block))

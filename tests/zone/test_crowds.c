@@ -180,6 +180,48 @@ static void a_rank_in_a_row_is_told_of_its_neighbours_only(void)
   rm_arena_drop(arena);
 }
 
+static rm_lid label_of(int rank, int64_t k) { return (rm_lid)((7 * rank + k) % 5); }
+
+/* Is every box that this rank asks for in a crowd of its label, or of several? */
+static void check_labels(const world *w, const rm_crowds *crowds, bool may_be_several)
+{
+  for (rm_lid c = 0; c < crowds->num; c++) {
+    const int64_t label = crowds->crowd[c].label;
+
+    RT_CHECK((label >= 0 && label < 5) || (may_be_several && c >= crowds->num_own && label == RM_SEVERAL_LABELS));
+  }
+  for (int r = 0; r < w->comm.size; r++)
+    for (int64_t k = w->offset[0][r]; k < w->offset[0][r + 1]; k++) {
+      const int64_t label = label_of(r, k - w->offset[0][r]);
+      bool          asks = false, found = false;
+
+      for (rm_lid q = 0; q < w->num[1]; q++) asks = asks || rm_box_meets(w->all[0][k], w->box[1][q]);
+      for (rm_lid c = 0; c < crowds->num; c++)
+        found = found || ((crowds->crowd[c].label == label || crowds->crowd[c].label == RM_SEVERAL_LABELS) &&
+                          holds(crowds->box[c], w->all[0][k]));
+      RT_CHECK(found || !asks);
+    }
+}
+
+static void crowds_have_the_labels_of_their_boxes(void)
+{
+  static const rm_lid most[2] = {RM_ALL_CROWDS, 3};
+
+  for (int k = 0; k < 2 * SEEDS; k++) {
+    world     w;
+    rm_crowds crowds;
+    rm_lid    label[N];
+
+    open_world(&w, k / 2);
+    for (rm_lid i = 0; i < w.num[0]; i++) label[i] = label_of(w.comm.rank, i);
+    if (RT_EQ(rm_crowds_meet_labelled(w.arena, &w.comm, w.num[0], (const double(*)[6])w.box[0], label, w.num[1],
+                                      (const double(*)[6])w.box[1], most[k % 2], &crowds),
+              REMAP_OK))
+      check_labels(&w, &crowds, k % 2 != 0);
+    close_world(&w);
+  }
+}
+
 static void memory_that_runs_out_on_one_rank_fails_on_all(void)
 {
   int failed = 0;
@@ -200,5 +242,5 @@ RT_MAIN(RT_CASE(every_box_that_a_rank_asks_for_is_in_a_crowd_of_whose_it_is),
         RT_CASE(a_crowd_comes_once_and_only_if_it_meets_what_is_asked_for),
         RT_CASE(joined_crowds_are_few_and_leave_nothing_out),
         RT_CASE(who_asks_for_everything_is_told_how_many_boxes_there_are),
-        RT_CASE(a_rank_in_a_row_is_told_of_its_neighbours_only),
+        RT_CASE(a_rank_in_a_row_is_told_of_its_neighbours_only), RT_CASE(crowds_have_the_labels_of_their_boxes),
         RT_CASE(memory_that_runs_out_on_one_rank_fails_on_all))

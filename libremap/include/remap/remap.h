@@ -159,8 +159,9 @@ typedef struct remap_options {
   int         max_order; /**< highest order that remap_field will be asked for: 1, 2 or 3; default 2. 3 costs memory: pairs get
                               second moments */
   int         systems;  /**< not 0: systems of fields will be moved at order 2, which takes second moments as well; default 0 */
-  int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP where zones of one mesh overlap by more
-                                          than rounding inside the other mesh; 0 (default): remap_stats tells */
+  int         zone_overlap_is_error; /**< not 0: remap_build returns ZONE_OVERLAP, before it overlays, where zones of one mesh
+                                          overlap by more than rounding inside the other mesh; 0 (default): remap_stats tells:
+                                          see its zone_overlap */
 
   /** Called with one line of text for a human, without a newline; any rank may call. NULL: silence. */
   void (*log)(void *user, const char *line);
@@ -295,8 +296,12 @@ typedef struct remap_stats {
   double  volume_by_cover[2][3];  /**< [side][remap_cover] sum of abs(volume) of those cells, whole cells */
   double  max_closure_error[2];   /**< [side] largest abs(sum of V over the cell's pairs / cell volume - 1), covered cells */
   int64_t worst_closure_cell[2];  /**< [side] its global id, -1 if none is covered */
-  double  zone_overlap[2];        /**< [side] largest volume shared by two cells of different zones of the mesh, where they
-                                       overlap by more than rounding and the other mesh sees it; 0: none */
+  double  zone_overlap[2];        /**< [side] largest volume shared by two cells of different zones of the mesh, by more than
+                                       rounding (no deeper, over the smaller one's surface, than 2^-20 of the mesh's largest
+                                       coordinate). Two cells count if a face of the one, without a cell behind it in any zone,
+                                       meets the other, and both meet cells of the other mesh, each by their boxes: so it is
+                                       where an overlap has its rim in the other mesh, while cells deep in two zones may be
+                                       left out. 0: none */
   int64_t zone_overlap_cell[2][2]; /**< [side] their global ids, -1 if none */
   int64_t crossings;              /**< edges of one mesh through triangles of the other */
   double  seconds_partition, seconds_overlay; /**< wall clock, slowest rank */

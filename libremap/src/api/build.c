@@ -2,10 +2,8 @@
  * that ends with it. */
 #include "api/context.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "moments/zone_overlap.h"
 
 /* ---- stages ------------------------------------------------------------------------------------------------------- */
 
@@ -17,17 +15,6 @@ static remap_status stage(remap_context *ctx, remap_status mine, rm_reason *reas
 
 /* Do pairs have second moments? */
 static bool has_second(const remap_context *ctx) { return ctx->options.max_order > 2 || ctx->options.systems; }
-
-/* The largest coordinate of each mesh over all ranks. */
-static remap_status find_magnitudes(remap_context *ctx, double magnitude[2])
-{
-  for (int side = 0; side < 2; side++) {
-    magnitude[side] = 0;
-    for (rm_lid c = 0; c < ctx->mesh[side]->num_cells; c++)
-      for (int k = 0; k < 6; k++) magnitude[side] = fmax(magnitude[side], fabs(ctx->mesh[side]->cell_box[c][k]));
-  }
-  return rm_comm_max_f64(&ctx->comm, magnitude, 2);
-}
 
 /* One of a rank's blocks, of which progress is told as of one. */
 typedef struct turn {
@@ -109,59 +96,7 @@ static remap_status overlay_all(remap_context *ctx, bool keeps, int64_t *crossin
   return status;
 }
 
-/* ---- zones -------------------------------------------------------------------------------------------------------- */
-
-/* Do zones of a mesh overlap, among all of its cells that come to this rank? They come together for this if they otherwise do
- * not. Collective. */
-static remap_status find_zone_overlap(remap_context *ctx, int side, double magnitude, rm_zone_overlap *out, rm_reason *reason)
-{
-  const rm_labels *labels = &ctx->labels[side];
-  rm_piece         all    = ctx->place.part.piece[side];
-  int64_t          zones  = labels->num_zones;
-  rm_arena        *arena;
-  remap_status     status;
-
-  *out = (rm_zone_overlap){0, {-1, -1}};
-  RM_TRY(rm_comm_max_i64(&ctx->comm, &zones, 1)); /* a rank without cells need not say */
-  if (zones < 2) return REMAP_OK;
-  arena = rm_arena_new();
-  status = arena ? REMAP_OK : REMAP_NO_MEMORY;
-  if (status == REMAP_OK && ctx->place.stock[side])
-    status = rm_part_take(arena, ctx->place.routes, ctx->place.stock[side], RM_EVERY_BLOCK, &all, reason);
-  if (status == REMAP_OK)
-    status = rm_zone_overlap_find(&ctx->frame, &all, ctx->options.faces, labels->num_zones, labels->zone_cell_offset, magnitude,
-                                  out, reason);
-  rm_arena_drop(arena);
-  return stage(ctx, status, reason);
-}
-
-/* The largest overlap of two zones over all ranks. */
-static remap_status worst_zone_overlap(remap_context *ctx, const rm_zone_overlap mine[2], rm_reason *reason)
-{
-  for (int side = 0; side < 2; side++) {
-    double  volume  = mine[side].volume;
-    int64_t cell[2] = {INT64_MIN, INT64_MIN}; /* negated, so that the smallest wins */
-
-    RM_TRY(rm_comm_max_f64(&ctx->comm, &volume, 1));
-    if (volume > 0 && mine[side].volume == volume) cell[0] = -mine[side].cell[0];
-    RM_TRY(rm_comm_max_i64(&ctx->comm, &cell[0], 1));
-    if (volume > 0 && mine[side].volume == volume && -mine[side].cell[0] == cell[0]) cell[1] = -mine[side].cell[1];
-    RM_TRY(rm_comm_max_i64(&ctx->comm, &cell[1], 1));
-    ctx->stats.zone_overlap[side] = volume;
-    for (int k = 0; k < 2; k++) ctx->stats.zone_overlap_cell[side][k] = volume > 0 ? -cell[k] : -1;
-  }
-  for (int side = 0; ctx->options.zone_overlap_is_error && side < 2; side++) {
-    if (ctx->stats.zone_overlap[side] <= 0) continue;
-    const rm_labels *labels = &ctx->labels[side];
-    const rm_gid     other = ctx->stats.zone_overlap_cell[side][1];
-    int64_t          z = labels->num_zones - 1;
-    while (z > 0 && labels->zone_cell_offset[z] > other) z--;
-    return rm_fail(REMAP_ZONE_OVERLAP, reason, side, ctx->stats.zone_overlap_cell[side][0],
-                   "it overlaps cell %lld of zone %s by more than rounding; choose one of the overlapping bases or zones",
-                   (long long)(other - labels->zone_cell_offset[z] + 1), labels->zone[z]);
-  }
-  return REMAP_OK;
-}
+/* ---- all of it ---------------------------------------------------------------------------------------------------- */
 
 static remap_status fill_stats(remap_context *ctx, int64_t crossings)
 {
@@ -186,7 +121,6 @@ static remap_status fill_stats(remap_context *ctx, int64_t crossings)
     s->worst_inverted_cell[side] = ctx->mesh[side]->worst_inverted;
     s->max_closure_error[side]  = m->max_closure_error[side];
     s->worst_closure_cell[side] = m->worst_closure_cell[side];
-    s->zone_overlap[side] *= cubed;
     for (int c = 0; c < 3; c++) {
       s->cells_by_cover[side][c]  = m->cells_by_cover[side][c];
       s->volume_by_cover[side][c] = m->volume_by_cover[side][c] * cubed;
@@ -210,17 +144,14 @@ static remap_status read_meshes(remap_context *ctx, bool is_new[2], rm_reason *r
 static remap_status build(remap_context *ctx, const bool moves[2], bool keeps, rm_reason *reason)
 {
   int64_t         crossings = 0;
-  rm_zone_overlap zones[2];
   bool            is_new[2] = {moves[0], moves[1]};
   const double    start = rm_seconds();
-  double          seconds, magnitude[2];
+  double          seconds;
 
   RM_TRY(read_meshes(ctx, is_new, reason));
+  RM_TRY(rm_context_compare_zones(ctx, reason));
   RM_TRY(rm_context_place(ctx, is_new, keeps, reason));
-  RM_TRY(find_magnitudes(ctx, magnitude));
   seconds = rm_seconds() - start;
-  for (int side = 0; side < 2; side++) RM_TRY(find_zone_overlap(ctx, side, magnitude[side], &zones[side], reason));
-  RM_TRY(worst_zone_overlap(ctx, zones, reason));
   RM_TRY(overlay_all(ctx, keeps, &crossings, &seconds, reason));
   RM_TRY(rm_context_compare_volumes(ctx));
   ctx->stats.seconds_partition = seconds;

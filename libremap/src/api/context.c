@@ -146,12 +146,17 @@ void remap_destroy(remap_context **ctx)
   *ctx = NULL;
 }
 
-/* Zone of a global cell, -1 if there are none. */
-static int64_t zone_of(const rm_labels *labels, rm_gid cell)
+int64_t rm_context_zone_of(const rm_labels *labels, rm_gid cell)
 {
-  int64_t z = labels->num_zones - 1;
-  while (z >= 0 && labels->zone_cell_offset[z] > cell) z--;
-  return z;
+  int64_t low = 0, high = labels->num_zones;
+
+  while (high - low > 1) {
+    const int64_t middle = low + (high - low) / 2;
+
+    if (labels->zone_cell_offset[middle] <= cell) low = middle;
+    else high = middle;
+  }
+  return high > low ? low : -1;
 }
 
 void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason)
@@ -164,7 +169,7 @@ void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason
   }
   const rm_labels *labels = &ctx->labels[reason->side];
   const char      *mesh   = labels->mesh ? labels->mesh : reason->side == REMAP_SOURCE ? "source mesh" : "target mesh";
-  const int64_t    zone   = reason->global_cell < 0 ? -1 : zone_of(labels, reason->global_cell);
+  const int64_t    zone   = reason->global_cell < 0 ? -1 : rm_context_zone_of(labels, reason->global_cell);
 
   if (reason->global_cell < 0)
     snprintf(ctx->message, sizeof ctx->message, "%s: %s", mesh, text);

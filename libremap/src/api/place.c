@@ -55,14 +55,13 @@ static remap_status find_approach(const remap_context *ctx, double *out)
   return REMAP_OK;
 }
 
-/* The margin for routes that are chosen now, from how far cells came in num_moves moves. Zones of one mesh are held against
- * each other among the cells of a piece, which are then those of a build. */
+/* The margin for routes that are chosen now, from how far cells came in num_moves moves. */
 static double choose_margin(const remap_context *ctx, double approach, int num_moves)
 {
   double size = INFINITY; /* of a cell */
 
   for (int side = 0; side < 2; side++) {
-    if (ctx->labels[side].num_zones > 1 || ctx->mesh[side]->num_global_cells == 0) return 0;
+    if (ctx->mesh[side]->num_global_cells == 0) return 0;
     size = fmin(size, cbrt(ctx->mesh[side]->volume / (double)ctx->mesh[side]->num_global_cells));
   }
   const double pace = num_moves > 0 ? approach / num_moves : 0;

@@ -1,44 +1,58 @@
 /* zone_overlap -- see zone_overlap.h. If two zones share volume, the skin of one passes through cells of the other: the cells
- * whose boxes meet a foreign zone's skin, and the cells behind that skin, are all that needs to be overlaid. */
+ * whose boxes meet a foreign zone's skin, and the cells behind that skin, are all that needs to be overlaid; first those pairs
+ * whose entered cell is of the zone that comes first, then the others. */
 #include "moments/zone_overlap.h"
 
 #include <math.h>
 #include <string.h>
 
 typedef struct candidates {
-  const rm_piece   *piece;
-  const rm_lid     *zone;        /* [cells] */
-  const double    (*box)[6];     /* [cells] */
-  const rm_lid     *skin;        /* faces   */
+  const rm_skins   *skins;
+  const double    (*box)[6];      /* [entered cells]                                     */
+  const rm_lid     *skin;         /* faces of the entering piece                         */
   const double    (*skin_box)[6];
-  const rm_boxtree *tree;        /* over the skin */
-  rm_lid            cell;
-  uint8_t          *entered, *entering; /* [cells] marks */
+  const rm_boxtree *tree;         /* over them                                           */
+  int               first;        /* RM_SKINS_ of those that come first in pairs         */
+  rm_lid            cell;         /* the entered one that asks                           */
+  rm_lid            other;        /* for this entering one                               */
+  uint8_t          *marks[2];     /* [RM_SKINS_][cells] is in such a pair                */
+  bool              any;          /* one is                                              */
 } candidates;
+
+static rm_lid cell_behind(const candidates *c, rm_lid s)
+{
+  return c->skins->piece[RM_SKINS_ENTERING].face_cell[c->skin[s]][0];
+}
+
+/* Is this a pair of different zones, the first of which is `first`? */
+static bool is_in_order(const candidates *c, rm_lid entered, rm_lid entering)
+{
+  const rm_lid zone[2] = {c->skins->zone[RM_SKINS_ENTERED][entered], c->skins->zone[RM_SKINS_ENTERING][entering]};
+
+  return zone[c->first] < zone[1 - c->first];
+}
 
 static int mark(void *user, rm_lid s)
 {
-  candidates  *c     = user;
-  const rm_lid owner = c->piece->face_cell[c->skin[s]][0];
+  candidates  *c        = user;
+  const rm_lid entering = cell_behind(c, s);
 
-  if (c->zone[owner] != c->zone[c->cell]) c->entered[c->cell] = c->entering[owner] = 1;
+  if (is_in_order(c, c->cell, entering)) {
+    c->marks[RM_SKINS_ENTERED][c->cell] = c->marks[RM_SKINS_ENTERING][entering] = 1;
+    c->any                                                                     = true;
+  }
   return 0;
 }
 
-static rm_lid zone_of(int64_t num_zones, const int64_t *offset, rm_gid cell)
+static int is_of_other(void *user, rm_lid s)
 {
-  int64_t low = 0, high = num_zones;
+  const candidates *c = user;
 
-  while (high - low > 1) {
-    const int64_t mid = low + (high - low) / 2;
-    if (offset[mid] <= cell) low = mid;
-    else high = mid;
-  }
-  return (rm_lid)low;
+  return cell_behind(c, s) == c->other;
 }
 
-/* The marked cells of a piece as a piece of their own; faces that lose their only cell go. */
-static remap_status marked_cells(rm_arena *arena, const rm_piece *p, const uint8_t *marks, rm_piece *out)
+/* The marked cells of a piece as a piece of their own, and their numbers before; faces that lose their only cell go. */
+static remap_status marked_cells(rm_arena *arena, const rm_piece *p, const uint8_t *marks, rm_piece *out, rm_lid **old)
 {
   rm_lid  *number, num_cells = 0, num_faces = 0, *node, (*cell)[2], *home;
   int64_t *offset, corners = 0;
@@ -58,6 +72,7 @@ static remap_status marked_cells(rm_arena *arena, const rm_piece *p, const uint8
   RM_NEW(home, arena, num_cells);
   RM_NEW(volume, arena, num_cells);
   RM_NEW(centroid, arena, num_cells);
+  RM_NEW(*old, arena, num_cells);
   offset[0] = 0;
   for (rm_lid f = 0; f < p->num_faces; f++) {
     const rm_lid owner = number[p->face_cell[f][0]], other = p->face_cell[f][1] >= 0 ? number[p->face_cell[f][1]] : -1;
@@ -72,6 +87,7 @@ static remap_status marked_cells(rm_arena *arena, const rm_piece *p, const uint8
   }
   for (rm_lid c = 0; c < p->num_cells; c++) {
     if (number[c] < 0) continue;
+    (*old)[number[c]] = c;
     global[number[c]] = p->cell_global[c];
     rank[number[c]]   = p->cell_home_rank[c];
     home[number[c]]   = p->cell_home[c];
@@ -105,30 +121,34 @@ static double surface(const rm_trimesh *m, rm_lid c)
   return area;
 }
 
-static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, const candidates *c, remap_faces faces,
-                                   int64_t num_zones, const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out,
-                                   rm_reason *reason)
+/* Overlay what is marked, and take the largest overlap beyond rounding. */
+static remap_status overlay_marked(rm_arena *arena, const rm_frame *frame, candidates *c, remap_faces faces, double magnitude,
+                                   rm_zone_overlap *out, rm_reason *reason)
 {
+  const int         kind[2] = {c->first, 1 - c->first}, at = kind[0] == RM_SKINS_ENTERED ? 0 : 1; /* of the entered piece */
   rm_part           part;
+  rm_lid           *old[2];
   const rm_trimesh *mesh[2];
   const rm_overlay *o;
   const rm_moments *m;
 
-  RM_TRY(marked_cells(arena, c->piece, c->entered, &part.piece[0]));
-  RM_TRY(marked_cells(arena, c->piece, c->entering, &part.piece[1]));
-  for (int k = 0; k < 2; k++) RM_TRY(rm_trimesh_build(arena, frame, &part.piece[k], faces, &mesh[k]));
+  for (int k = 0; k < 2; k++) {
+    RM_TRY(marked_cells(arena, &c->skins->piece[kind[k]], c->marks[kind[k]], &part.piece[k], &old[k]));
+    RM_TRY(rm_trimesh_build(arena, frame, &part.piece[k], faces, &mesh[k]));
+  }
   RM_TRY(rm_overlay_build(arena, mesh, &part, NULL, &o, reason));
   RM_TRY(rm_moments_build(arena, &part, o, 1, &m));
   for (int64_t k = 0; k < m->num_pairs; k++) {
-    const rm_gid a = part.piece[0].cell_global[m->source[k]], b = part.piece[1].cell_global[m->target[k]];
+    const rm_lid cell[2] = {m->source[k], m->target[k]};
+    const rm_gid a = part.piece[0].cell_global[cell[0]], b = part.piece[1].cell_global[cell[1]];
     const double v = fabs(m->volume[k]);
 
-    if (zone_of(num_zones, zone_cell_offset, a) == zone_of(num_zones, zone_cell_offset, b)) continue;
-    if (v <= 0x1p-20 * magnitude * fmin(surface(mesh[0], m->source[k]), surface(mesh[1], m->target[k]))) continue;
-    const rm_gid low = a < b ? a : b, high = a < b ? b : a;
-    if (v < out->volume || (v == out->volume && (low > out->cell[0] || (low == out->cell[0] && high >= out->cell[1]))))
-      continue;
-    *out = (rm_zone_overlap){v, {low, high}};
+    if (v <= 0x1p-20 * magnitude * fmin(surface(mesh[0], cell[0]), surface(mesh[1], cell[1]))) continue;
+    if (v < out->volume || (v == out->volume && (a > out->cell[0] || (a == out->cell[0] && b >= out->cell[1])))) continue;
+    c->cell  = old[at][cell[at]];
+    c->other = old[1 - at][cell[1 - at]];
+    if (is_in_order(c, c->cell, c->other) && rm_boxtree_query(c->tree, c->skin_box, c->box[c->cell], is_of_other, c))
+      *out = (rm_zone_overlap){v, {a, b}};
   }
   return REMAP_OK;
 }
@@ -141,33 +161,41 @@ static void widen(double box[6], const double other[6])
   }
 }
 
-/* The boxes of a piece's cells, and its faces in the skin of the mesh with theirs. */
+static const double nothing[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+
+static void find_face_box(const rm_piece *p, rm_lid f, double out[6])
+{
+  memcpy(out, nothing, sizeof nothing);
+  for (int64_t k = p->face_offset[f]; k < p->face_offset[f + 1]; k++) {
+    const double *x = p->node_xyz[p->face_node[k]];
+
+    widen(out, (const double[6]){x[0], x[1], x[2], x[0], x[1], x[2]});
+  }
+}
+
+/* The boxes of the entered cells, and the faces of entering ones in the skin of the mesh with theirs. */
 static remap_status find_boxes(rm_arena *arena, candidates *c)
 {
-  static const double nothing[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
-  const rm_piece     *p          = c->piece;
-  rm_lid             *skin, num = 0;
-  double            (*box)[6], (*skin_box)[6];
+  const rm_piece *entered = &c->skins->piece[RM_SKINS_ENTERED], *entering = &c->skins->piece[RM_SKINS_ENTERING];
+  rm_lid         *skin, num = 0;
+  double        (*box)[6], (*skin_box)[6];
 
-  for (rm_lid f = 0; f < p->num_faces; f++) num += p->face_is_skin[f];
-  RM_NEW(box, arena, p->num_cells);
-  RM_NEW(skin, arena, num);
-  RM_NEW(skin_box, arena, num);
-  for (rm_lid k = 0; k < p->num_cells; k++) memcpy(box[k], nothing, sizeof nothing);
-  num = 0;
-  for (rm_lid f = 0; f < p->num_faces; f++) {
+  RM_NEW(box, arena, entered->num_cells);
+  for (rm_lid k = 0; k < entered->num_cells; k++) memcpy(box[k], nothing, sizeof nothing);
+  for (rm_lid f = 0; f < entered->num_faces; f++) {
     double own[6];
 
-    memcpy(own, nothing, sizeof own);
-    for (int64_t k = p->face_offset[f]; k < p->face_offset[f + 1]; k++) {
-      const double *x = p->node_xyz[p->face_node[k]];
-
-      widen(own, (const double[6]){x[0], x[1], x[2], x[0], x[1], x[2]});
-    }
+    find_face_box(entered, f, own);
     for (int h = 0; h < 2; h++)
-      if (p->face_cell[f][h] >= 0) widen(box[p->face_cell[f][h]], own);
-    if (!p->face_is_skin[f]) continue;
-    memcpy(skin_box[num], own, sizeof own);
+      if (entered->face_cell[f][h] >= 0) widen(box[entered->face_cell[f][h]], own);
+  }
+  for (rm_lid f = 0; f < entering->num_faces; f++) num += entering->face_is_skin[f];
+  RM_NEW(skin, arena, num);
+  RM_NEW(skin_box, arena, num);
+  num = 0;
+  for (rm_lid f = 0; f < entering->num_faces; f++) {
+    if (!entering->face_is_skin[f]) continue;
+    find_face_box(entering, f, skin_box[num]);
     skin[num++] = f;
   }
   c->box      = (const double(*)[6])box;
@@ -176,31 +204,31 @@ static remap_status find_boxes(rm_arena *arena, candidates *c)
   return rm_boxtree_build(arena, num, c->skin_box, &c->tree);
 }
 
-remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, remap_faces faces, int64_t num_zones,
-                                  const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason)
+/* Pairs in which entered cells, or entering ones, come first. */
+static remap_status find_in_order(rm_arena *arena, const rm_frame *frame, candidates *c, int first, remap_faces faces,
+                                  double magnitude, rm_zone_overlap *out, rm_reason *reason)
 {
-  rm_arena    *arena  = rm_arena_new();
-  remap_status status = arena ? REMAP_OK : REMAP_NO_MEMORY;
-  candidates   c      = {.piece = piece};
-  rm_lid      *zone;
-  bool         any = false;
+  c->first = first;
+  c->any   = false;
+  for (int kind = 0; kind < 2; kind++) RM_NEW0(c->marks[kind], arena, c->skins->piece[kind].num_cells);
+  for (c->cell = 0; c->cell < c->skins->piece[RM_SKINS_ENTERED].num_cells; c->cell++)
+    rm_boxtree_query(c->tree, c->skin_box, c->box[c->cell], mark, c);
+  return c->any ? overlay_marked(arena, frame, c, faces, magnitude, out, reason) : REMAP_OK;
+}
+
+remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_skins *skins, remap_faces faces, double magnitude,
+                                  rm_zone_overlap *out, rm_reason *reason)
+{
+  candidates   c = {.skins = skins};
+  rm_arena    *arena;
+  remap_status status = REMAP_NO_MEMORY;
 
   *out = (rm_zone_overlap){0, {-1, -1}};
-  if (status == REMAP_OK && num_zones > 1) {
-    c.zone     = zone = rm_arena_alloc(arena, piece->num_cells, sizeof *zone);
-    c.entered  = rm_arena_zero(arena, piece->num_cells, 1);
-    c.entering = rm_arena_zero(arena, piece->num_cells, 1);
-    status     = zone && c.entered && c.entering ? find_boxes(arena, &c) : REMAP_NO_MEMORY;
-    for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++)
-      zone[k] = zone_of(num_zones, zone_cell_offset, piece->cell_global[k]);
-    for (rm_lid k = 0; status == REMAP_OK && k < piece->num_cells; k++) {
-      c.cell = k;
-      rm_boxtree_query(c.tree, c.skin_box, c.box[k], mark, &c);
-      any |= c.entered[k];
-    }
-    if (status == REMAP_OK && any)
-      status = overlay_marked(arena, frame, &c, faces, num_zones, zone_cell_offset, magnitude, out, reason);
-  }
+  if (!skins->any) return REMAP_OK;
+  arena = rm_arena_new();
+  if (arena) status = find_boxes(arena, &c);
+  for (int first = 0; first < 2 && status == REMAP_OK; first++)
+    status = find_in_order(arena, frame, &c, first, faces, magnitude, out, reason);
   rm_arena_drop(arena);
   return status;
 }

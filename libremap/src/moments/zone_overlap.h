@@ -1,4 +1,4 @@
-/* zone_overlap -- do zones of one mesh overlap by more than rounding? */
+/* zone_overlap -- do zones of one mesh overlap by more than rounding, among the cells that come to this rank? */
 #ifndef RM_ZONE_OVERLAP_H
 #define RM_ZONE_OVERLAP_H
 
@@ -9,11 +9,11 @@ typedef struct rm_zone_overlap {
   rm_gid cell[2]; /* their global ids ascending, -1 if none                                                    */
 } rm_zone_overlap;
 
-/* Overlay the cells of a piece that a foreign zone's skin may enter with the cells behind that skin. Zone z holds the global
- * cells from zone_cell_offset[z] up to zone_cell_offset[z + 1]. Rounding: an overlap no deeper, over the smaller cell's
- * surface, than 2^-20 of `magnitude`, the whole mesh's largest coordinate, which single precision stays well below. Not
- * collective. O(n) for zones that join; patched interfaces cost an overlay of the layers beside them. */
-remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_piece *piece, remap_faces faces, int64_t num_zones,
-                                  const int64_t *zone_cell_offset, double magnitude, rm_zone_overlap *out, rm_reason *reason);
+/* Overlay the entered cells with the entering ones, the one of the zone that comes first as the source, so that the volume of a
+ * pair is the same wherever it is made. Those pairs count of which a face of the skin of the one meets the other by their
+ * boxes. Rounding: an overlap no deeper, over the smaller cell's surface, than 2^-20 of `magnitude`, the whole mesh's largest
+ * coordinate, which single precision stays well below. Not collective. Twice the cost of an overlay of these cells. */
+remap_status rm_zone_overlap_find(const rm_frame *frame, const rm_skins *skins, remap_faces faces, double magnitude,
+                                  rm_zone_overlap *out, rm_reason *reason);
 
 #endif

@@ -26,20 +26,6 @@ static remap_status match(work *w, int side, rm_lid num, const rm_lid *cell, int
   return rm_part_touch(w->scratch, w->comm, pair, &queried, held, out, w->reason);
 }
 
-/* The cut of both meshes, at the same keys. Collective. */
-static remap_status cut(work *w, const rm_frame *frame)
-{
-  rm_frame     zone_frame;
-  rm_cuts      cuts;
-  remap_status mine = REMAP_OK;
-
-  RM_TRY(rm_part_frame(w->comm, frame, w->mesh, w->zone, &zone_frame));
-  RM_TRY(rm_part_cut_evenly(w->scratch, w->comm, &zone_frame, w->mesh, w->zone, &cuts));
-  for (int side = 0; side < 2 && mine == REMAP_OK; side++)
-    mine = rm_part_route_to_seats(w->scratch, w->comm, &zone_frame, w->mesh[side], w->zone, &cuts, &w->core[side]);
-  return rm_comm_agree(w->comm, mine, NULL);
-}
-
 /* Which cells of this rank meet the other mesh. Not collective. */
 static remap_status mark_met(rm_arena *arena, work *w)
 {
@@ -151,7 +137,7 @@ done:
 
 static remap_status cover(rm_arena *arena, work *w, const rm_frame *frame, int keep, rm_cover *out)
 {
-  RM_TRY(cut(w, frame));
+  RM_TRY(rm_part_route_evenly(w->scratch, w->comm, frame, w->mesh, w->zone, w->core));
   for (int side = 0; side < 2; side++)
     RM_TRY(match(w, side, w->zone->num_cells[side], w->zone->cell[side], 1 - side, &w->core[1 - side], &w->across[side]));
   RM_TRY(rm_comm_agree(w->comm, mark_met(arena, w), NULL));

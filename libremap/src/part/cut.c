@@ -235,6 +235,20 @@ remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_f
   return REMAP_OK;
 }
 
+remap_status rm_part_route_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                                  const rm_zone *zone, rm_route route[2])
+{
+  rm_frame     zone_frame;
+  rm_cuts      cuts;
+  remap_status mine = REMAP_OK;
+
+  RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
+  RM_TRY(rm_part_cut_evenly(arena, comm, &zone_frame, mesh, zone, &cuts));
+  for (int side = 0; side < 2 && mine == REMAP_OK; side++)
+    mine = rm_part_route_to_seats(arena, comm, &zone_frame, mesh[side], zone, &cuts, &route[side]);
+  return rm_comm_agree(comm, mine, NULL);
+}
+
 /* ---- of tags that lie in order ------------------------------------------------------------------------------------ */
 
 /* This rank's tags of both sides by key, and the work of each. */

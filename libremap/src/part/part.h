@@ -80,10 +80,9 @@ int rm_part_blocks(const rm_routes *routes);
 remap_status rm_part_send(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_routes *routes,
                           const rm_stock **out, rm_reason *reason);
 
-/* The cells of a block, or of any block, each once, if that is RM_EVERY_BLOCK; then they have no roles. Not collective, and not
- * twice at once from one stock. *out lives in arena, its roles with the routes. Cells come in ascending order of the rank of
- * their home, then of their number there: later rooms must not let results depend on it. TOO_LARGE, NO_MEMORY. */
-enum { RM_EVERY_BLOCK = -1 };
+/* The cells of a block. Not collective, and not twice at once from one stock. *out lives in arena, its roles with the routes.
+ * Cells come in ascending order of the rank of their home, then of their number there: later rooms must not let results depend
+ * on it. TOO_LARGE, NO_MEMORY. */
 remap_status rm_part_take(rm_arena *arena, const rm_routes *routes, const rm_stock *stock, int block, rm_piece *out,
                           rm_reason *reason);
 
@@ -108,5 +107,20 @@ enum { RM_COVER_CORE = 1, RM_COVER_MET = 2 };
  * arena. TOO_LARGE as rm_part_build. */
 remap_status rm_part_cover(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
                            const rm_zone *zone, int keep, const bool all[2], const rm_cover **out, rm_reason *reason);
+
+/* Cells of one mesh, brought together where the skin of one zone may enter a cell of another, both cells having boxes that meet
+ * that of a cell of the other mesh: entered ones, each on one rank, at least those whose boxes meet that of a foreign face of
+ * the skin; and there every entering one, behind such a face, whose box meets theirs. So every pair of which a face of the one
+ * meets the box of the other is on exactly one rank, whatever their number. */
+enum { RM_SKINS_ENTERED = 0, RM_SKINS_ENTERING = 1 };
+typedef struct rm_skins {
+  bool          any;      /* the same on every rank; false: nothing else is set       */
+  rm_piece      piece[2]; /* [RM_SKINS_] a cell may be in both                         */
+  const rm_lid *zone[2];  /* [RM_SKINS_][cells of the piece] */
+} rm_skins;
+
+/* zone: [cells of that side on this rank]. Collective. Lives in arena. TOO_LARGE as rm_part_build. */
+remap_status rm_part_skins(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2], int side,
+                           const rm_lid *zone, rm_skins *out, rm_reason *reason);
 
 #endif

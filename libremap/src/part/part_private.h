@@ -8,7 +8,8 @@
  *   match    every rank lists the cells its blocks need, and asks their homes for those of other ranks
  *   ship     cells with their faces and nodes travel; those of a block are taken out of what is there
  *
- * The part of a supermesh (cover) is cut evenly and matched from the homes (touch).
+ * The part of a supermesh (cover), and where zones of one mesh may overlap (skins), are cut evenly and matched from the homes
+ * (touch).
  *
  * Each stage ends in one agreement, so its status is the same on every rank. */
 #ifndef RM_PART_PRIVATE_H
@@ -116,6 +117,11 @@ remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const 
  * as keys differ. Collective. *out lives in arena, as does what is needed on the way. */
 remap_status rm_part_cut_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                                 const rm_zone *zone, rm_cuts *out);
+
+/* Both: cut them evenly, and route the cells of each mesh to their seats. Collective. route [side] lives in arena, as does what
+ * is needed on the way. */
+remap_status rm_part_route_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                                  const rm_zone *zone, rm_route route[2]);
 
 /* Cut tags, which lie in order over the ranks, into intervals of equal work; work [side][tags->num[side]] is not negative. A
  * tag goes to the side of the cut on which most of it lies. Collective. *out lives in arena, as does what is needed on the

@@ -420,47 +420,17 @@ static remap_status pack_block(rm_arena *arena, rm_arena *scratch, const rm_stoc
   return join(arena, RM_SHARES, stock->mesh->side, &p.out, list->offset, out, reason);
 }
 
-/* The cells of any block, each once. */
-static remap_status unite(rm_arena *scratch, const rm_routes *routes, int side, rm_route *out)
-{
-  int64_t   most = 0, num = 0;
-  uint64_t *word;
-
-  for (int b = 0; b < routes->num_blocks; b++) most += routes->block[b].list[side].offset[RM_SHARES];
-  RM_NEW(out->offset, scratch, RM_SHARES + 1);
-  RM_NEW(out->cell, scratch, most);
-  RM_NEW(word, scratch, most);
-  out->offset[0] = 0;
-  for (int share = 0; share < RM_SHARES; share++) {
-    int64_t n = 0;
-
-    for (int b = 0; b < routes->num_blocks; b++) {
-      const rm_route *of = &routes->block[b].list[side];
-
-      for (int64_t k = of->offset[share]; k < of->offset[share + 1]; k++) word[n++] = (uint64_t)of->cell[k];
-    }
-    rm_sort_words(word, n);
-    for (int64_t k = 0; k < n; k++)
-      if (k == 0 || word[k] != word[k - 1]) out->cell[num++] = (rm_lid)word[k];
-    out->offset[share + 1] = num;
-  }
-  return REMAP_OK;
-}
-
 remap_status rm_part_take(rm_arena *arena, const rm_routes *routes, const rm_stock *stock, int block, rm_piece *out,
                           rm_reason *reason)
 {
   const int    side    = (int)stock->mesh->side;
   rm_arena    *scratch = rm_arena_new();
-  rm_route     list    = {NULL, NULL};
   rm_piece     piece   = {0};
-  remap_status status  = scratch ? REMAP_OK : REMAP_NO_MEMORY;
+  remap_status status  = REMAP_NO_MEMORY;
 
-  if (status == REMAP_OK && block == RM_EVERY_BLOCK) status = unite(scratch, routes, side, &list);
-  if (block != RM_EVERY_BLOCK) list = routes->block[block].list[side];
-  if (status == REMAP_OK) status = pack_block(arena, scratch, stock, &list, &piece, reason);
-  if (block != RM_EVERY_BLOCK) piece.cell_role = routes->block[block].role[side];
-  *out = piece;
+  if (scratch) status = pack_block(arena, scratch, stock, &routes->block[block].list[side], &piece, reason);
+  piece.cell_role = routes->block[block].role[side];
+  *out            = piece;
   rm_arena_drop(scratch);
   return status;
 }

@@ -111,19 +111,54 @@ static remap_status climb(meeting *m)
 
 /* ---- crowds ------------------------------------------------------------------------------------------------------- */
 
-/* This rank's crowds. */
-static remap_status make_crowds(meeting *m, rm_lid n, const double (*box)[6])
+/* Add crowds of boxes that have one label. */
+static remap_status add_crowds(meeting *m, rm_lid n, const double (*box)[6], int64_t label, int most)
 {
-  region made;
+  double (*around)[6];
+  int    num = 0;
 
-  RM_TRY(group(m->scratch, n, box, &made));
-  RM_NEW(m->own_crowd, m->scratch, made.num);
-  m->num_own = made.num;
-  for (int64_t g = 0; g < made.num; g++) {
-    m->own_crowd[g] = (rm_crowd){.num = (double)n / (double)made.num, .rank = m->comm->rank};
-    memcpy(m->own_crowd[g].box, made.box[g], sizeof *made.box);
+  RM_NEW(around, m->scratch, most);
+  RM_TRY(rm_box_groups(m->scratch, n, box, most, around, NULL, &num));
+  for (int g = 0; g < num; g++) {
+    rm_crowd *c = &m->own_crowd[m->num_own++];
+
+    *c = (rm_crowd){.num = (double)n / num, .rank = m->comm->rank, .label = label};
+    memcpy(c->box, around[g], sizeof *around);
   }
   return REMAP_OK;
+}
+
+/* This rank's crowds, label by label, each with its share of RM_CROWDS. */
+static remap_status make_labelled(meeting *m, rm_lid n, const double (*box)[6], const rm_lid *label)
+{
+  rm_keyed *keyed, *spare;
+  double  (*sorted)[6];
+  int       num_labels = 0;
+
+  RM_NEW(keyed, m->scratch, n);
+  RM_NEW(spare, m->scratch, n);
+  RM_NEW(sorted, m->scratch, n);
+  for (rm_lid k = 0; k < n; k++) keyed[k] = (rm_keyed){(uint64_t)label[k], k};
+  rm_sort_keyed(keyed, spare, n);
+  for (rm_lid k = 0; k < n; k++) {
+    memcpy(sorted[k], box[keyed[k].item], sizeof *sorted);
+    num_labels += k == 0 || keyed[k].key != keyed[k - 1].key;
+  }
+  const int share = num_labels > 0 && RM_CROWDS / num_labels > 1 ? RM_CROWDS / num_labels : 1;
+
+  RM_NEW(m->own_crowd, m->scratch, (int64_t)num_labels * share);
+  for (rm_lid k = 0, end; k < n; k = end) {
+    for (end = k + 1; end < n && keyed[end].key == keyed[k].key;) end++;
+    RM_TRY(add_crowds(m, end - k, (const double(*)[6])(sorted + k), (int64_t)keyed[k].key, share));
+  }
+  return REMAP_OK;
+}
+
+static remap_status make_crowds(meeting *m, rm_lid n, const double (*box)[6], const rm_lid *label)
+{
+  if (label) return make_labelled(m, n, box, label);
+  RM_NEW(m->own_crowd, m->scratch, RM_CROWDS);
+  return add_crowds(m, n, box, 0, RM_CROWDS);
 }
 
 /* Copy the crowds that meet a region; returns their number. */
@@ -167,8 +202,11 @@ static remap_status join(meeting *m, rm_lid most)
   RM_TRY(rm_box_groups(m->scratch, (rm_lid)m->num, box, most, around, group_of, &num));
   RM_NEW0(joined, m->scratch, num);
   for (int64_t k = 0; k < m->num; k++) {
-    joined[group_of[k]].num += m->crowd[k].num;
-    joined[group_of[k]].rank = m->crowd[k].rank;
+    rm_crowd *to = &joined[group_of[k]];
+
+    to->label = to->num > 0 && to->label != m->crowd[k].label ? RM_SEVERAL_LABELS : m->crowd[k].label;
+    to->rank  = m->crowd[k].rank;
+    to->num += m->crowd[k].num;
   }
   for (int g = 0; g < num; g++) memcpy(joined[g].box, around[g], sizeof *around);
   m->num   = num;
@@ -233,8 +271,15 @@ static remap_status put_out(rm_arena *arena, const meeting *m, rm_crowds *out)
 remap_status rm_crowds_meet(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6], rm_lid num_asking,
                             const double (*asking)[6], rm_lid most, rm_crowds *out)
 {
+  return rm_crowds_meet_labelled(arena, comm, num_boxes, box, NULL, num_asking, asking, most, out);
+}
+
+remap_status rm_crowds_meet_labelled(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6],
+                                     const rm_lid *label, rm_lid num_asking, const double (*asking)[6], rm_lid most,
+                                     rm_crowds *out)
+{
   meeting      m    = {.scratch = rm_arena_new(), .comm = comm, .failed = REMAP_OK};
-  remap_status mine = m.scratch ? make_crowds(&m, num_boxes, box) : REMAP_NO_MEMORY, status;
+  remap_status mine = m.scratch ? make_crowds(&m, num_boxes, box, label) : REMAP_NO_MEMORY, status;
 
   halve(&m);
   if (mine == REMAP_OK && comm->size > 1) mine = group(m.scratch, num_asking, asking, &m.own[m.num_levels]);

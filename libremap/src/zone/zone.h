@@ -44,9 +44,11 @@ remap_status rm_box_groups(rm_arena *scratch, rm_lid n, const double (*box)[6], 
 /* A crowd: boxes of a rank that lie side by side, by one around them. */
 typedef struct rm_crowd {
   double  box[6];
-  double  num;  /* boxes in it, about                      */
-  int64_t rank; /* whose they are; if it is joined, of some */
+  double  num;   /* boxes in it, about                                       */
+  int64_t rank;  /* whose they are; if it is joined, of some                 */
+  int64_t label; /* of its boxes, 0 if they have none; RM_SEVERAL_LABELS     */
 } rm_crowd;
+enum { RM_SEVERAL_LABELS = -1 };
 
 /* Crowds that this rank knows of. Read-only once built. */
 typedef struct rm_crowds {
@@ -66,6 +68,12 @@ enum { RM_CROWDS = 64, RM_SOME_CROWDS = 4096, RM_ALL_CROWDS = INT32_MAX };
  * many ranks there are. *out lives in arena. TOO_LARGE if a rank cannot number them. */
 remap_status rm_crowds_meet(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6], rm_lid num_asking,
                             const double (*asking)[6], rm_lid most, rm_crowds *out);
+
+/* The same for boxes with labels, [num_boxes] from 0, such as zones: a rank makes crowds of one label each, RM_CROWDS of them
+ * or one for each label. */
+remap_status rm_crowds_meet_labelled(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6],
+                                     const rm_lid *label, rm_lid num_asking, const double (*asking)[6], rm_lid most,
+                                     rm_crowds *out);
 
 /* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */
 typedef struct rm_zone {
