@@ -3,6 +3,7 @@
  * and the bytes do not depend on the number of ranks. Linear in the slices, but for sorting of nodes. */
 #include "boolean.h"
 
+#include <base.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdlib.h>
@@ -47,7 +48,7 @@ static bool list_faces(const rslice_content *content, int64_t *offset, int64_t *
     inner[f] |= m->face_neighbour[f] >= 0;
     offset[f + 1] = offset[f] + (inner[f] ? 0 : HEAD + CORNER * (m->face_offset[f + 1] - m->face_offset[f]));
   }
-  *word = inner ? rslice_room(offset[m->num_faces], sizeof **word) : NULL;
+  *word = inner ? ra_zeros(offset[m->num_faces], sizeof **word) : NULL;
   for (int64_t f = 0; *word && f < m->num_faces; f++) {
     const int32_t *loop = m->face_node + m->face_offset[f];
     const int64_t  n    = m->face_offset[f + 1] - m->face_offset[f];
@@ -73,7 +74,7 @@ static bool list_faces(const rslice_content *content, int64_t *offset, int64_t *
 static rslice_status ship_faces(outer *o)
 {
   const remap_supermesh_view *m      = o->content->mesh;
-  int64_t                    *offset = rslice_room(m->num_faces + 1, sizeof *offset), *word = NULL;
+  int64_t                    *offset = ra_zeros(m->num_faces + 1, sizeof *offset), *word = NULL;
   rslice_status               status = offset && list_faces(o->content, offset, &word) ? RSLICE_OK : RSLICE_MEMORY;
 
   status = rslice_ship(o->comm, status, m->global_faces, m->num_faces, m->face_global, offset, word, &o->faces);
@@ -94,7 +95,7 @@ static int by_number(const void *a, const void *b)
 static int64_t *list_nodes(const outer *o, int64_t *num, int64_t *count)
 {
   const int64_t words = o->faces.offset[o->faces.num];
-  int64_t      *node  = rslice_room(words / CORNER, sizeof *node), n = 0;
+  int64_t      *node  = ra_zeros(words / CORNER, sizeof *node), n = 0;
 
   *num = 0;
   for (int64_t at = 0; node && at < words; at += HEAD + CORNER * o->faces.word[at])
@@ -102,7 +103,7 @@ static int64_t *list_nodes(const outer *o, int64_t *num, int64_t *count)
   if (node) qsort(node, (size_t)n, sizeof *node, by_number);
   for (int64_t i = 0, r = 0; node && i < n; i++) {
     if (*num && node[*num - 1] == node[i]) continue;
-    while (node[i] >= rslice_begin(o->content->mesh->global_nodes, (int)r + 1, o->size)) r++;
+    while (node[i] >= ra_share(o->content->mesh->global_nodes, (int)r + 1, o->size)) r++;
     count[r]++;
     node[(*num)++] = node[i];
   }
@@ -113,7 +114,7 @@ static int64_t *list_nodes(const outer *o, int64_t *num, int64_t *count)
  * others lose their words. Collective. */
 static rslice_status answer(outer *o, rslice_status mine, int64_t num, int64_t *asked)
 {
-  int64_t *number = mine == RSLICE_OK ? rslice_room(o->nodes.num, sizeof *number) : NULL, before = 0, used = 0;
+  int64_t *number = mine == RSLICE_OK ? ra_zeros(o->nodes.num, sizeof *number) : NULL, before = 0, used = 0;
 
   for (int64_t i = 0; number && i < num; i++) number[asked[i] - o->nodes.first] = 1;
   for (int64_t i = 0; number && i < o->nodes.num; i++) used += number[i];
@@ -134,7 +135,7 @@ static bool number_corners(outer *o, int64_t num, const int64_t *node, const int
   const int64_t words = o->faces.offset[o->faces.num];
   int64_t       n     = 0;
 
-  o->number = rslice_room(words / CORNER, sizeof *o->number);
+  o->number = ra_zeros(words / CORNER, sizeof *o->number);
   for (int64_t at = 0; o->number && at < words; at += HEAD + CORNER * o->faces.word[at])
     for (int64_t i = 0; i < o->faces.word[at]; i++) {
       const int64_t *found = bsearch(&o->faces.word[at + HEAD + CORNER * i], node, (size_t)num, sizeof *node, by_number);
@@ -147,7 +148,7 @@ static bool number_corners(outer *o, int64_t num, const int64_t *node, const int
 /* Which nodes are written, and under which numbers. Collective. */
 static rslice_status number_nodes(outer *o)
 {
-  int64_t      *count  = rslice_room(2 * (int64_t)o->size, sizeof *count), num = 0, num_asked = 0;
+  int64_t      *count  = ra_zeros(2 * (int64_t)o->size, sizeof *count), num = 0, num_asked = 0;
   int64_t      *node   = count ? list_nodes(o, &num, count) : NULL;
   void         *asked  = NULL, *number = NULL;
   rslice_status status = rslice_nodes(o->comm, o->content->mesh, &o->nodes);
@@ -171,7 +172,7 @@ static rslice_status number_nodes(outer *o)
 static rslice_status triangulate(outer *o)
 {
   const int64_t  words     = o->faces.offset[o->faces.num];
-  const char   **name      = rslice_room(o->num_parts, sizeof *name);
+  const char   **name      = ra_zeros(o->num_parts, sizeof *name);
   double        *xyz       = NULL;
   rsurf_builder *builder   = NULL;
   int64_t        most      = 0;
@@ -180,7 +181,7 @@ static rslice_status triangulate(outer *o)
 
   for (int64_t at = 0; at < words; at += HEAD + CORNER * o->faces.word[at])
     if (o->faces.word[at] > most) most = o->faces.word[at];
-  if (status == RSLICE_OK && !(xyz = rslice_room(3 * most, sizeof *xyz))) status = RSLICE_MEMORY;
+  if (status == RSLICE_OK && !(xyz = ra_zeros(3 * most, sizeof *xyz))) status = RSLICE_MEMORY;
   for (int part = 1; name && part < o->num_parts; part++) name[part - 1] = group_name(o, part);
   if (status == RSLICE_OK) status = from_surface(rsurf_begin(o->num_parts - 1, name, &builder, &message));
   for (int64_t at = 0; at < words && status == RSLICE_OK; at += HEAD + CORNER * o->faces.word[at]) {
@@ -224,7 +225,7 @@ static int64_t list_items(const outer *o, item *list)
 static item *sort_items(const outer *o, int64_t *first)
 {
   const int64_t n      = list_items(o, NULL);
-  item         *list   = rslice_room(2 * n, sizeof *list), *sorted = list ? list + n : NULL;
+  item         *list   = ra_zeros(2 * n, sizeof *list), *sorted = list ? list + n : NULL;
 
   if (!list) return NULL;
   list_items(o, list);
@@ -260,13 +261,13 @@ static void print_nodes(const outer *o, FILE *out)
 /* All of this rank's text. */
 static rslice_status print_parts(outer *o)
 {
-  int64_t *first = rslice_room(o->num_parts + 2, sizeof *first);
+  int64_t *first = ra_zeros(o->num_parts + 2, sizeof *first);
   item    *list  = first ? sort_items(o, first) : NULL;
   size_t   size  = 0;
   FILE    *out   = list ? open_memstream(&o->text, &size) : NULL;
   bool     ok    = out != NULL;
 
-  o->part_at = rslice_room(o->num_parts + 1, sizeof *o->part_at);
+  o->part_at = ra_zeros(o->num_parts + 1, sizeof *o->part_at);
   for (int part = 0; ok && o->part_at && part < o->num_parts; part++) {
     if (part == NODES) print_nodes(o, out);
     for (int64_t i = first[part]; i < first[part + 1]; i++) print_item(o, out, &list[i]);
@@ -379,7 +380,7 @@ static cli_exit write_file(const outer *o, layout *l, cli_failure *why)
 
 static cli_exit write_text(const outer *o, cli_failure *why)
 {
-  layout   l    = {rslice_room(o->num_parts, sizeof *l.size), rslice_room(o->num_parts, sizeof *l.before), 0};
+  layout   l    = {ra_zeros(o->num_parts, sizeof *l.size), ra_zeros(o->num_parts, sizeof *l.before), 0};
   cli_exit code = cli_agree_on(o->comm, l.size && l.before ? CLI_DONE : cli_no_memory(why), why);
 
   if (code == CLI_DONE) {

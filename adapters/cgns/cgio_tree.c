@@ -90,7 +90,7 @@ static rcgns_status read_range(int cg, double id, const char *path, const char *
   rc_box       part[RC_MAX_BOXES];
   const int    parts  = rc_box_cut(box, lo, hi, part);
   const int    width  = rc_width(type);
-  char        *raw    = as == 'N' ? out : rc_alloc(hi - lo, (size_t)width);
+  char        *raw    = as == 'N' ? out : ra_alloc(hi - lo, (size_t)width);
   rcgns_status status = raw ? RCGNS_OK : rc_no_memory(message);
 
   for (int64_t p = 0, at = 0; p < parts && status == RCGNS_OK; at += rc_box_count(part + p++))
@@ -130,7 +130,7 @@ static rcgns_status payload(rc_tree *tree, int cg, double id, const char *path, 
                    path, n->name);
   if (!rc_is_small(n)) return RCGNS_OK;
   box   = rc_whole(n);
-  small = rc_alloc(count, sizeof(int64_t));
+  small = ra_alloc(count, sizeof(int64_t));
   if (!small) return rc_no_memory(message);
   status = read_range(cg, id, path, n->type, &box, 0, count, n->kind == 'C' ? 'N' : n->kind, small, message);
   if (status == RCGNS_OK) {
@@ -184,7 +184,7 @@ static rcgns_status walk(rc_tree *tree, int cg, double id, int64_t parent, int d
   if (n.is_dead) return RCGNS_OK;
   if (cgio_number_children(cg, id, &children) || children < 0) return adf_fail(message, path, n.name);
   if (!children) return RCGNS_OK;
-  ids = rc_alloc(children, sizeof *ids);
+  ids = ra_alloc(children, sizeof *ids);
   if (!ids) return rc_no_memory(message);
   if (cgio_children_ids(cg, id, 1, children, &got, ids)) status = adf_fail(message, path, n.name);
   for (int i = 0; i < got; i++) {

@@ -1,9 +1,9 @@
 /* cgns_private.h -- what the files of the adapter share. Nobody else includes it, but the adapter's tests.
  *
- *   common.c     status and message, agreement of ranks, growing arrays, hashing, exchange of records
+ *   common.c     status and message, agreement of ranks, exchange of records
  *   tree.c       the file's tree as plain data, the same on every rank
  *   cgio_tree.c  ADF files through cgio           (the only file that includes cgns_io.h)
- *   h5_tree.c    HDF5 files: tree and slabs       (with h5_write.c the only files that include hdf5.h)
+ *   h5_tree.c    HDF5 files: tree and slabs       (with h5_write.c the only files that include hdf5.h, by h5.h)
  *   h5_write.c   HDF5 output from a plan
  *   file.c       rcgns_open, rcgns_close, reading of slabs from either kind of file
  *   sids_zone.c  zones and element sections: what is a volume cell
@@ -23,6 +23,7 @@
 #ifndef REMAP_ADAPTERS_CGNS_PRIVATE_H
 #define REMAP_ADAPTERS_CGNS_PRIVATE_H
 
+#include "base.h"
 #include "cgns.h"
 
 #include <stdbool.h>
@@ -64,45 +65,7 @@ rcgns_status rc_agree(MPI_Comm comm, rcgns_status mine, rcgns_message *message);
 /* Broadcast of any length from rank 0. Collective. */
 void rc_bcast(MPI_Comm comm, void *data, int64_t bytes);
 
-/* ---- memory ------------------------------------------------------------------------------------------------------- */
-
-/* An array that grows: items of one size, owned. All zero is an empty array. */
-typedef struct rc_array {
-  void   *item;
-  int64_t count, capacity;
-} rc_array;
-
-/* Room for `more` further items of `size` bytes. false: no memory, nothing changed. */
-bool rc_reserve(rc_array *array, int64_t more, size_t size);
-/* Append one int64_t. */
-bool rc_push(rc_array *array, int64_t value);
-/* Give an array back; it is empty then. */
-void rc_drop(rc_array *array);
-/* malloc for count items, never NULL for 0 of them; NULL if the product overflows or memory is short. */
-void *rc_alloc(int64_t count, size_t size);
-
-/* A map from keys of 1 to 4 int64_t to 0, 1, 2 ... in the order they come. All zero is an empty map of no width. */
-typedef struct rc_map {
-  int      width; /* int64_t per key */
-  rc_array key;   /* [count][width] */
-  int64_t *slot;  /* [num_slots] index of a key, -1: free */
-  int64_t  num_slots;
-} rc_map;
-
-/* Index of the key, which is added if new; -1: no memory. */
-int64_t rc_map_add(rc_map *map, const int64_t *key);
-/* Index of the key, -1: it is not there. */
-int64_t rc_map_find(const rc_map *map, const int64_t *key);
-/* Give a map back; it is empty then, of the same width. */
-void rc_map_drop(rc_map *map);
-
-/* ---- distribution ------------------------------------------------------------------------------------------------- */
-
-/* First of n items that rank r of size ranks owns; r == size gives n. Shares differ by one at most. */
-int64_t               rc_share(int64_t n, int rank, int size);
 static inline int64_t rc_clamp(int64_t value, int64_t lo, int64_t hi) { return value < lo ? lo : value > hi ? hi : value; }
-/* The rank that owns item i. */
-int rc_owner(int64_t n, int64_t i, int size);
 
 /* Records of `size` bytes to every rank and back: send holds send_count[r] records for rank r, r ascending. *received is
  * the caller's (free), recv_count [ranks] is filled. Collective, with agreement: mine is the caller's own status so far. */
@@ -136,7 +99,7 @@ typedef struct rc_source {
 /* Node 0 is the root. Read-only once it is broadcast. Invariants: parent < index of node; children are linked in the order
  * of the file; small payloads have rc_count(node) values, aligned to 8 bytes. */
 typedef struct rc_tree {
-  rc_array node, source, pool; /* rc_node, rc_source, char */
+  ra_array node, source, pool; /* rc_node, rc_source, char */
 } rc_tree;
 
 static inline rc_node       *rc_node_at(const rc_tree *tree, int64_t i) { return (rc_node *)tree->node.item + i; }
@@ -234,7 +197,7 @@ typedef struct rc_section {
   int64_t   num_rows, length;      /* rows, and values of ElementConnectivity */
   int64_t   row_lo, row_hi;        /* rows that are no rind */
   int64_t   num_cells, first_cell; /* volume cells; number of the first in its zone */
-  rc_array  cut;                   /* MIXED, INLINE: rc_cut, every RC_CUT-th row of those that this rank passed, ascending */
+  ra_array  cut;                   /* MIXED, INLINE: rc_cut, every RC_CUT-th row of those that this rank passed, ascending */
 } rc_section;
 
 enum { RC_CUT = 1024 };
@@ -273,11 +236,11 @@ typedef struct rc_rim {
 
 /* This rank's mesh while it grows. */
 typedef struct rc_mesh {
-  rc_array rim;         /* rc_rim */
-  rc_array rim_node;    /* int64_t, of polyhedra: nodes in the zone */
-  rc_array xyz;         /* double[3] */
-  rc_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
-  rc_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
+  ra_array rim;         /* rc_rim */
+  ra_array rim_node;    /* int64_t, of polyhedra: nodes in the zone */
+  ra_array xyz;         /* double[3] */
+  ra_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
+  ra_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
 } rc_mesh;
 
 struct rcgns_file {
@@ -296,11 +259,11 @@ struct rcgns_file {
   remap_mesh       mesh;
   const char     **zone_name;
   int64_t         *zone_cell_offset;
-  rc_array         names;        /* char *, owned: every string that info hands out */
-  rc_array         bases, notes; /* const char *, in names */
+  ra_array         names;        /* char *, owned: every string that info hands out */
+  ra_array         bases, notes; /* const char *, in names */
   rcgns_zone_info *zone_info;
   rcgns_info       info;
-  rc_array         boundary_name, boundary_type; /* const char *, in names */
+  ra_array         boundary_name, boundary_type; /* const char *, in names */
   int32_t         *face_boundary;                /* [faces of mesh] NULL before they are asked for */
   int64_t         *solution;                     /* [num_zones] node of the chosen FlowSolution_t, -1 */
   rcgns_field     *field;
@@ -344,7 +307,7 @@ rcgns_status rc_cuts_find(rcgns_file *file, rcgns_status mine, const rc_section 
 /* Rows [lo, hi) of a section that is not FIXED: offset [hi - lo + 1] and data, the type word of MIXED included, the count of
  * INLINE not. Collective. */
 rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
-                          rc_array *offset, rc_array *data, rcgns_message *message);
+                          ra_array *offset, ra_array *data, rcgns_message *message);
 /* The Rind of a node: [2 nd], zero where there is none. false: it is malformed. */
 bool rc_rind(const rc_tree *tree, int64_t parent, int nd, int64_t *rind);
 
@@ -401,7 +364,7 @@ typedef struct rc_entry {
 } rc_entry;
 
 typedef struct rc_plan {
-  rc_array entry;
+  ra_array entry;
 } rc_plan;
 
 /* Append an entry; its index, -1: no memory. Type NULL or nd 0: no payload; else literal is written as type. */
@@ -414,7 +377,7 @@ void rc_plan_drop(rc_plan *plan);
 /* A plan whose arrays it owns; ok turns false where memory runs out, and stays so. */
 typedef struct rc_draft {
   rc_plan  plan;
-  rc_array owned; /* void * */
+  ra_array owned; /* void * */
   bool     ok;
 } rc_draft;
 

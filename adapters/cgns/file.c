@@ -21,7 +21,7 @@ const char *rc_keep(rcgns_file *file, const char *format, ...)
   length = vsnprintf(NULL, 0, format, args);
   va_end(args);
   text = length < 0 ? NULL : malloc((size_t)length + 1);
-  if (!text || !rc_reserve(&file->names, 1, sizeof text)) {
+  if (!text || !ra_reserve(&file->names, 1, sizeof text)) {
     free(text);
     return NULL;
   }
@@ -32,13 +32,13 @@ const char *rc_keep(rcgns_file *file, const char *format, ...)
   return text;
 }
 
-static bool keep_in(rcgns_file *file, rc_array *list, const char *text)
+static bool keep_in(rcgns_file *file, ra_array *list, const char *text)
 {
   const char *mine;
 
   for (int64_t i = 0; i < list->count; i++)
     if (!strcmp(((const char **)list->item)[i], text)) return true;
-  if (!(mine = rc_keep(file, "%s", text)) || !rc_reserve(list, 1, sizeof mine)) return false;
+  if (!(mine = rc_keep(file, "%s", text)) || !ra_reserve(list, 1, sizeof mine)) return false;
   ((const char **)list->item)[list->count++] = mine;
   return true;
 }
@@ -149,7 +149,7 @@ static rcgns_status open_all(rcgns_file *file, rcgns_message *message)
   const int64_t num    = file->tree.source.count;
   rcgns_status  status = RCGNS_OK;
 
-  if (!(file->handle = rc_alloc(num, sizeof *file->handle))) status = rc_no_memory(message);
+  if (!(file->handle = ra_alloc(num, sizeof *file->handle))) status = rc_no_memory(message);
   RC_TRY(rc_agree(file->comm, status, message));
   for (int64_t i = 0; i < num; i++) file->handle[i] = -1;
   for (int64_t i = 0; i < num && status == RCGNS_OK; i++) {
@@ -196,10 +196,10 @@ static rcgns_status fill_info(rcgns_file *file, rcgns_message *message)
 {
   rcgns_info *info = &file->info;
 
-  file->zone_info        = rc_alloc(file->num_zones, sizeof *file->zone_info);
-  file->zone_name        = rc_alloc(file->num_zones, sizeof *file->zone_name);
-  file->zone_cell_offset = rc_alloc(file->num_zones + 1, sizeof *file->zone_cell_offset);
-  file->solution         = rc_alloc(file->num_zones, sizeof *file->solution);
+  file->zone_info        = ra_alloc(file->num_zones, sizeof *file->zone_info);
+  file->zone_name        = ra_alloc(file->num_zones, sizeof *file->zone_name);
+  file->zone_cell_offset = ra_alloc(file->num_zones + 1, sizeof *file->zone_cell_offset);
+  file->solution         = ra_alloc(file->num_zones, sizeof *file->solution);
   if (!file->zone_info || !file->zone_name || !file->zone_cell_offset || !file->solution) return rc_no_memory(message);
   for (int64_t z = 0; z < file->num_zones; z++) {
     const rc_zone *zone = file->zone + z;
@@ -235,8 +235,8 @@ static rcgns_status open_file(rcgns_file *file, const rcgns_options *options, rc
   read_version(file);
   RC_TRY(open_all(file, message));
   RC_TRY(rc_zones_find(file, options->base, message));
-  file->cell_lo = rc_share(file->num_cells, file->rank, file->size);
-  file->cell_hi = rc_share(file->num_cells, file->rank + 1, file->size);
+  file->cell_lo = ra_share(file->num_cells, file->rank, file->size);
+  file->cell_hi = ra_share(file->num_cells, file->rank + 1, file->size);
   RC_TRY(rc_agree(file->comm, fill_info(file, message), message));
   file->info.location = options->location;
   RC_TRY(rc_mesh_build(file, message));
@@ -292,11 +292,11 @@ void rcgns_close(rcgns_file **address)
   rc_tree_drop(&file->tree);
   rc_mesh_drop(&file->build);
   for (int64_t i = 0; i < file->names.count; i++) free(((char **)file->names.item)[i]);
-  rc_drop(&file->names);
-  rc_drop(&file->bases);
-  rc_drop(&file->notes);
-  rc_drop(&file->boundary_name);
-  rc_drop(&file->boundary_type);
+  ra_drop(&file->names);
+  ra_drop(&file->bases);
+  ra_drop(&file->notes);
+  ra_drop(&file->boundary_name);
+  ra_drop(&file->boundary_type);
   free(file->face_boundary);
   free(file->zone_info);
   free(file->zone_name);

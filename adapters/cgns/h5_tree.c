@@ -5,25 +5,18 @@
  * MPI-IO, by each rank for itself: they are contiguous, so there is nothing to gather for one another, and neighbouring slabs
  * of nodes overlap, for which collective reads of Open MPI 4.1 (OMPIO with dynamic or vulcan) return too few values and say
  * nothing. */
-#include "cgns_private.h"
+#include "h5.h"
 
-#include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_DEPTH = 100, MAX_NODES = 1 << 24 };
 
-#define QUIETLY(statement)       \
-  do {                           \
-    H5E_BEGIN_TRY { statement; } \
-    H5E_END_TRY                  \
-  } while (0)
-
 /* The walk's files: opened once each. */
 typedef struct walker {
   rc_tree       *tree;
-  rc_array       file; /* hid_t for each source of the tree */
+  ra_array       file; /* hid_t for each source of the tree */
   rcgns_message *message;
   bool           no_memory; /* somewhere on the way: then a link that leads nowhere need not be dead */
 } walker;
@@ -36,7 +29,7 @@ bool rc_h5_is_file(const char *path)
 {
   htri_t is = 0;
 
-  QUIETLY(is = H5Fis_hdf5(path));
+  RC_QUIETLY(is = H5Fis_hdf5(path));
   return is > 0;
 }
 
@@ -60,13 +53,8 @@ static void read_attribute(hid_t group, const char *name, char *out, size_t size
   H5Aclose(attribute);
 }
 
-static hid_t memory_type(char as, const char *type)
+hid_t rc_h5_type(const char *type)
 {
-  switch (as) {
-    case 'I': return H5T_NATIVE_INT64;
-    case 'R': return H5T_NATIVE_DOUBLE;
-    default: break;
-  }
   if (!strcmp(type, "I4")) return H5T_NATIVE_INT32;
   if (!strcmp(type, "I8")) return H5T_NATIVE_INT64;
   if (!strcmp(type, "U4")) return H5T_NATIVE_UINT32;
@@ -76,6 +64,16 @@ static hid_t memory_type(char as, const char *type)
   if (!strcmp(type, "B1")) return H5T_NATIVE_UCHAR;
   if (!strcmp(type, "C1")) return H5T_NATIVE_SCHAR;
   return -1;
+}
+
+/* The type in which values are wanted: as integers, as reals, or as they are. */
+static hid_t memory_type(char as, const char *type)
+{
+  switch (as) {
+    case 'I': return H5T_NATIVE_INT64;
+    case 'R': return H5T_NATIVE_DOUBLE;
+    default: return rc_h5_type(type);
+  }
 }
 
 /* What the dataset really holds, whatever the node's type says. */
@@ -134,7 +132,7 @@ static rcgns_status payload(walker *w, hid_t group, rc_node *n)
   if (rc_is_small(n)) {
     const int64_t count = rc_count(n);
 
-    small = rc_alloc(count, sizeof(int64_t));
+    small = ra_alloc(count, sizeof(int64_t));
     if (!small)
       status = rc_no_memory(w->message);
     else if (H5Dread(data, memory_type(n->kind == 'C' ? 'N' : n->kind, n->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, small) < 0)
@@ -177,7 +175,7 @@ static int source_at(walker *w, const char *path)
   for (int i = 0; i < (int)w->tree->source.count; i++)
     if (!strcmp(path_of(w, i), path)) return i;
   if (!rc_h5_is_file(path) || (file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT)) < 0) return -1;
-  source = rc_reserve(&w->file, 1, sizeof file) ? rc_tree_source(w->tree, path, false) : -1;
+  source = ra_reserve(&w->file, 1, sizeof file) ? rc_tree_source(w->tree, path, false) : -1;
   if (source == -1) w->no_memory = true;
   if (source < 0) {
     H5Fclose(file);
@@ -290,20 +288,20 @@ static bool is_above(walker *w, int64_t node, int source, const char *path)
 }
 
 typedef struct names {
-  rc_array name; /* char * */
+  ra_array name; /* char * */
   bool     no_memory;
 } names;
 
 static herr_t collect(hid_t group, const char *name, const H5L_info_t *info, void *user)
 {
   names    *mine = user;
-  rc_array *list = &mine->name;
+  ra_array *list = &mine->name;
   char     *copy;
 
   (void)group;
   (void)info;
   if (*name == ' ') return 0;
-  if (!rc_reserve(list, 1, sizeof copy) || !(copy = strdup(name))) {
+  if (!ra_reserve(list, 1, sizeof copy) || !(copy = strdup(name))) {
     mine->no_memory = true;
     return -1;
   }
@@ -340,7 +338,7 @@ static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source
     }
     free(name);
   }
-  rc_drop(&list.name);
+  ra_drop(&list.name);
   return status;
 }
 
@@ -389,7 +387,7 @@ static rcgns_status walk_all(walker *w)
   rcgns_status  status;
 
   if (file < 0) return rc_fail(w->message, RCGNS_IO, "%s: HDF5 cannot open it: the file is truncated, damaged or locked", path);
-  if (!rc_reserve(&w->file, 1, sizeof file)) {
+  if (!ra_reserve(&w->file, 1, sizeof file)) {
     H5Fclose(file);
     return rc_no_memory(w->message);
   }
@@ -406,9 +404,9 @@ rcgns_status rc_h5_walk(rc_tree *tree, rcgns_message *message)
   walker       w      = {.tree = tree, .message = message};
   rcgns_status status = RCGNS_OK;
 
-  QUIETLY(status = walk_all(&w));
-  for (int64_t i = 0; i < w.file.count; i++) QUIETLY(H5Fclose(file_of(&w, (int)i)));
-  rc_drop(&w.file);
+  RC_QUIETLY(status = walk_all(&w));
+  for (int64_t i = 0; i < w.file.count; i++) RC_QUIETLY(H5Fclose(file_of(&w, (int)i)));
+  ra_drop(&w.file);
   return status;
 }
 
@@ -420,17 +418,16 @@ rcgns_status rc_h5_open(MPI_Comm comm, const char *path, int64_t *handle, rcgns_
   hid_t       file   = -1;
 
   H5Pset_fapl_mpio(access, comm, MPI_INFO_NULL);
-  QUIETLY(file = H5Fopen(path, H5F_ACC_RDONLY, access));
+  RC_QUIETLY(file = H5Fopen(path, H5F_ACC_RDONLY, access));
   H5Pclose(access);
   *handle = (int64_t)file;
   return file < 0 ? rc_fail(message, RCGNS_IO, "%s: cannot be opened by all ranks: do they see the same file system?", path)
                   : RCGNS_OK;
 }
 
-void rc_h5_close(int64_t handle) { QUIETLY(H5Fclose((hid_t)handle)); }
+void rc_h5_close(int64_t handle) { RC_QUIETLY(H5Fclose((hid_t)handle)); }
 
-/* Select [lo, hi) of the box in a dataset's space. */
-static bool select_range(hid_t space, const rc_box *box, int64_t lo, int64_t hi)
+bool rc_h5_select(hid_t space, const rc_box *box, int64_t lo, int64_t hi)
 {
   rc_box    part[RC_MAX_BOXES];
   const int parts = rc_box_cut(box, lo, hi, part);
@@ -473,12 +470,12 @@ rcgns_status rc_h5_read(int64_t handle, const char *path, const char *type, cons
 
   if (!name) return rc_no_memory(message);
   snprintf(name, size, "%s/ data", path);
-  QUIETLY(ok = judged((data = H5Dopen2((hid_t)handle, name, H5P_DEFAULT)) >= 0, &is_short));
+  RC_QUIETLY(ok = judged((data = H5Dopen2((hid_t)handle, name, H5P_DEFAULT)) >= 0, &is_short));
   if (ok) {
     space  = H5Dget_space(data);
     memory = H5Screate_simple(1, &count, NULL);
-    ok     = H5Sget_simple_extent_ndims(space) == box->nd && select_range(space, box, lo, hi);
-    if (ok) QUIETLY(ok = judged(H5Dread(data, memory_type(as, type), memory, space, H5P_DEFAULT, out) >= 0, &is_short));
+    ok     = H5Sget_simple_extent_ndims(space) == box->nd && rc_h5_select(space, box, lo, hi);
+    if (ok) RC_QUIETLY(ok = judged(H5Dread(data, memory_type(as, type), memory, space, H5P_DEFAULT, out) >= 0, &is_short));
     H5Sclose(memory);
     H5Sclose(space);
     H5Dclose(data);

@@ -4,11 +4,10 @@
  * without values. Then all ranks open it through MPI-IO and fill those arrays by collective writes of their own slabs. What
  * lies where was settled by one rank and no time is stamped anywhere, so the bytes do not depend on the number of ranks. The
  * format is kept to that of HDF5 1.8, which every CGNS library opens. */
-#include "cgns_private.h"
+#include "h5.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,25 +16,6 @@
 #include <unistd.h>
 
 enum { COPY_ROUND = 1 << 22, WRITE_ROUND = 1 << 26 }; /* values of one rank in one transfer */
-
-#define QUIETLY(statement)       \
-  do {                           \
-    H5E_BEGIN_TRY { statement; } \
-    H5E_END_TRY                  \
-  } while (0)
-
-static hid_t stored_type(const char *type)
-{
-  if (!strcmp(type, "I4")) return H5T_NATIVE_INT32;
-  if (!strcmp(type, "I8")) return H5T_NATIVE_INT64;
-  if (!strcmp(type, "U4")) return H5T_NATIVE_UINT32;
-  if (!strcmp(type, "U8")) return H5T_NATIVE_UINT64;
-  if (!strcmp(type, "R4")) return H5T_NATIVE_FLOAT;
-  if (!strcmp(type, "R8")) return H5T_NATIVE_DOUBLE;
-  if (!strcmp(type, "C1")) return H5T_NATIVE_SCHAR;
-  if (!strcmp(type, "B1")) return H5T_NATIVE_UCHAR;
-  return -1;
-}
 
 /* "/A/B" of an entry; the caller frees. */
 static char *path_of(const rc_plan *plan, int64_t i)
@@ -150,13 +130,13 @@ static void make_entry(maker *m, const rc_plan *plan, int64_t i)
   if (e->content == RC_LINK)
     link_datasets(m, group, e);
   else if (e->content == RC_LITERAL)
-    dataset(m, group, " data", stored_type(e->type), e->nd, e->dim,
+    dataset(m, group, " data", rc_h5_type(e->type), e->nd, e->dim,
             e->kind == 'I'   ? H5T_NATIVE_INT64
             : e->kind == 'R' ? H5T_NATIVE_DOUBLE
-                             : stored_type(e->type),
+                             : rc_h5_type(e->type),
             e->literal);
   else if (e->content != RC_EMPTY)
-    dataset(m, group, " data", stored_type(e->type), e->nd, e->dim, -1, NULL);
+    dataset(m, group, " data", rc_h5_type(e->type), e->nd, e->dim, -1, NULL);
   H5Gclose(group);
 }
 
@@ -243,7 +223,7 @@ rcgns_status rc_h5_skeleton(const char *path, const rc_plan *plan, rcgns_message
 {
   int error = ask_space(path, most_bytes(plan));
 
-  if (!error) QUIETLY(error = make_file(path, plan));
+  if (!error) RC_QUIETLY(error = make_file(path, plan));
   if (error == ENOMEM) return rc_no_memory(message);
   return error ? rc_fail(message, RCGNS_IO, "cannot be written: %s", strerror(error)) : RCGNS_OK;
 }
@@ -256,19 +236,8 @@ static bool write_range(hid_t data, const rc_box *box, int64_t lo, int64_t hi, h
   const hsize_t count = lo < hi ? (hsize_t)(hi - lo) : 0;
   const hid_t   space = H5Dget_space(data), shape = H5Screate_simple(1, &count, NULL), transfer = H5Pcreate(H5P_DATASET_XFER);
   const char    nothing[16] = {0};
-  rc_box        part[RC_MAX_BOXES];
-  const int     parts = rc_box_cut(box, lo, hi, part);
-  bool          ok    = H5Sselect_none(space) >= 0;
+  bool          ok          = rc_h5_select(space, box, lo, hi);
 
-  for (int p = 0; p < parts; p++) {
-    hsize_t start[RC_MAX_DIMS], size[RC_MAX_DIMS];
-
-    for (int d = 0; d < box->nd; d++) {
-      start[d] = (hsize_t)part[p].origin[d];
-      size[d]  = (hsize_t)part[p].shape[d];
-    }
-    ok = ok && H5Sselect_hyperslab(space, p ? H5S_SELECT_OR : H5S_SELECT_SET, start, NULL, size, NULL) >= 0;
-  }
   if (!count) H5Sselect_none(shape);
   H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
   ok = H5Dwrite(data, memory, shape, space, transfer, count ? values : nothing) >= 0 && ok;
@@ -298,17 +267,17 @@ static rcgns_status copy_array(rcgns_file *file, hid_t data, const rc_entry *e, 
     from.shape[d] = to.shape[d] = e->dim[d];
     total *= e->dim[d];
   }
-  lo     = rc_share(total, file->rank, file->size);
-  hi     = rc_share(total, file->rank + 1, file->size);
-  rounds = (rc_share(total, 1, file->size) + COPY_ROUND - 1) / COPY_ROUND;
-  block  = rc_alloc(hi - lo < COPY_ROUND ? hi - lo : COPY_ROUND, (size_t)width);
+  lo     = ra_share(total, file->rank, file->size);
+  hi     = ra_share(total, file->rank + 1, file->size);
+  rounds = (ra_share(total, 1, file->size) + COPY_ROUND - 1) / COPY_ROUND;
+  block  = ra_alloc(hi - lo < COPY_ROUND ? hi - lo : COPY_ROUND, (size_t)width);
   status = rc_agree(file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
   for (int64_t r = 0; r < rounds && status == RCGNS_OK; r++) {
     const int64_t a = rc_clamp(lo + r * COPY_ROUND, lo, hi), b = rc_clamp(a + COPY_ROUND, a, hi);
 
     status = rc_read(file, RCGNS_OK, e->node, &from, a, b, 'N', block, message);
     if (status == RCGNS_OK)
-      status = write_failed(file, write_range(data, &to, a, b, stored_type(e->type), block), e->name, message);
+      status = write_failed(file, write_range(data, &to, a, b, rc_h5_type(e->type), block), e->name, message);
   }
   free(block);
   return status;
@@ -321,7 +290,7 @@ static rcgns_status write_values(rcgns_file *file, hid_t data, const rc_entry *e
   const rc_zone *zone   = file->zone + e->zone;
   const int64_t  lo     = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells);
   const int64_t  hi     = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
-  const int64_t  most   = rc_share(file->num_cells, 1, file->size);
+  const int64_t  most   = ra_share(file->num_cells, 1, file->size);
   const int64_t  rounds = ((most < zone->num_cells ? most : zone->num_cells) + WRITE_ROUND - 1) / WRITE_ROUND;
   const double  *values = fields[e->field].values;
   rc_box         box    = {.nd = e->nd};
@@ -411,6 +380,6 @@ rcgns_status rc_h5_fill(rcgns_file *file, const char *path, const rc_plan *plan,
 {
   rcgns_status status = RCGNS_OK;
 
-  QUIETLY(status = fill_file(file, path, plan, fields, message));
+  RC_QUIETLY(status = fill_file(file, path, plan, fields, message));
   return status;
 }

@@ -18,22 +18,22 @@ typedef struct bc_zone {
   const rc_zone *zone;
   rc_rim        *rim; /* those of the zone */
   int64_t        num;
-  rc_map         by_nodes;  /* standard elements: nodes of a rim -> its place in rim_of */
-  rc_array       rim_of;    /* int64_t */
-  rc_map         by_number; /* element number, of a block code_of -> place in rim_of_number */
-  rc_array       rim_of_number;
+  ra_map         by_nodes;  /* standard elements: nodes of a rim -> its place in rim_of */
+  ra_array       rim_of;    /* int64_t */
+  ra_map         by_number; /* element number, of a block code_of -> place in rim_of_number */
+  ra_array       rim_of_number;
   bool           has_nodes;
-  rc_map         node;  /* nodes of rims; once a condition of vertices was met */
+  ra_map         node;  /* nodes of rims; once a condition of vertices was met */
   uint8_t       *named; /* [nodes of rims] the condition's list has it */
 } bc_zone;
 
 static void drop_zone(bc_zone *z)
 {
-  rc_map_drop(&z->by_nodes);
-  rc_map_drop(&z->by_number);
-  rc_map_drop(&z->node);
-  rc_drop(&z->rim_of);
-  rc_drop(&z->rim_of_number);
+  ra_map_drop(&z->by_nodes);
+  ra_map_drop(&z->by_number);
+  ra_map_drop(&z->node);
+  ra_drop(&z->rim_of);
+  ra_drop(&z->rim_of_number);
   free(z->named);
 }
 
@@ -46,12 +46,12 @@ static void give(const bc_zone *z, int64_t rim, int32_t boundary)
 }
 
 /* Several rims may have one key: faces of flat cells. The map's index leads to the last, whose number is kept. */
-static bool add_key(rc_map *map, rc_array *rim_of, const int64_t *key, int64_t rim)
+static bool add_key(ra_map *map, ra_array *rim_of, const int64_t *key, int64_t rim)
 {
-  const int64_t at = rc_map_add(map, key);
+  const int64_t at = ra_map_add(map, key);
 
   if (at < 0) return false;
-  if (at == rim_of->count) return rc_push(rim_of, rim);
+  if (at == rim_of->count) return ra_push_int(rim_of, rim);
   ((int64_t *)rim_of->item)[at] = rim;
   return true;
 }
@@ -127,7 +127,7 @@ static bool index_nodes(bc_zone *z)
   for (int64_t i = 0; i < z->num && ok && !z->has_nodes; i++) {
     const int64_t num = nodes_of(z, &z->rim[i], room, &node);
 
-    for (int64_t k = 0; k < num && ok; k++) ok = rc_map_add(&z->node, &node[k]) >= 0;
+    for (int64_t k = 0; k < num && ok; k++) ok = ra_map_add(&z->node, &node[k]) >= 0;
   }
   if (!z->has_nodes) z->named = calloc((size_t)z->node.key.count + 1, 1);
   z->has_nodes = true;
@@ -151,7 +151,7 @@ static bool number_face(bc_zone *z, const int64_t *corner, int n, int64_t number
     for (k = num++; k > 0 && key[k - 1] > node; k--) key[k] = key[k - 1];
     key[k] = node;
   }
-  at = rc_map_find(&z->by_nodes, key);
+  at = ra_map_find(&z->by_nodes, key);
   return at < 0 || add_key(&z->by_number, &z->rim_of_number, &number, ((const int64_t *)z->rim_of.item)[at]);
 }
 
@@ -167,7 +167,7 @@ static rcgns_status number_fixed(bc_zone *z, int64_t node, int npe, int corners,
   rcgns_status   status;
 
   if (!range || range[0] < 1 || range[0] > INT64_MAX / 2 || num < 1 || rc_node_at(tree, data)->kind != 'I') return RCGNS_OK;
-  block  = rc_alloc((int64_t)BLOCK * npe, sizeof *block);
+  block  = ra_alloc((int64_t)BLOCK * npe, sizeof *block);
   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
   for (int64_t lo = 0; lo < num && status == RCGNS_OK; lo += BLOCK) {
     const int64_t hi = lo + BLOCK < num ? lo + BLOCK : num;
@@ -185,7 +185,7 @@ static rcgns_status number_fixed(bc_zone *z, int64_t node, int npe, int corners,
 /* Surface elements among the rows of a MIXED section. Collective. */
 static rcgns_status number_mixed(bc_zone *z, const rc_section *s, rcgns_message *message)
 {
-  rc_array     offset = {.item = NULL}, data = {.item = NULL};
+  ra_array     offset = {.item = NULL}, data = {.item = NULL};
   rcgns_status status = RCGNS_OK;
 
   for (int64_t lo = 0; lo < s->num_rows && status == RCGNS_OK; lo += BLOCK) {
@@ -201,8 +201,8 @@ static rcgns_status number_mixed(bc_zone *z, const rc_section *s, rcgns_message 
     }
     if (status == RCGNS_OK) status = rc_agree(z->file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
   }
-  rc_drop(&offset);
-  rc_drop(&data);
+  ra_drop(&offset);
+  ra_drop(&data);
   return status;
 }
 
@@ -248,7 +248,7 @@ static void give_numbers(bc_zone *z, const int64_t *number, int64_t n, bool of_v
 {
   for (int64_t i = 0; i < n; i++) {
     const int64_t key = number[i] < 1 ? -1 : number[i] - of_vertices;
-    const int64_t at  = rc_map_find(of_vertices ? &z->node : &z->by_number, &key);
+    const int64_t at  = ra_map_find(of_vertices ? &z->node : &z->by_number, &key);
 
     if (at >= 0 && of_vertices) z->named[at] = 1;
     if (at >= 0 && !of_vertices) give(z, ((const int64_t *)z->rim_of_number.item)[at], boundary);
@@ -258,7 +258,7 @@ static void give_numbers(bc_zone *z, const int64_t *number, int64_t n, bool of_v
 /* The same of all numbers from lo to hi. */
 static void give_span(bc_zone *z, int64_t lo, int64_t hi, bool of_vertices, int32_t boundary)
 {
-  const rc_array *keys = of_vertices ? &z->node.key : &z->by_number.key;
+  const ra_array *keys = of_vertices ? &z->node.key : &z->by_number.key;
 
   for (int64_t i = 0; i < keys->count; i++) {
     const int64_t number = ((const int64_t *)keys->item)[i] + of_vertices;
@@ -277,7 +277,7 @@ static void give_named(bc_zone *z, int32_t boundary)
     const int64_t num = nodes_of(z, &z->rim[i], room, &node);
     bool          in  = true;
 
-    for (int64_t k = 0; k < num && in; k++) in = z->named[rc_map_find(&z->node, &node[k])];
+    for (int64_t k = 0; k < num && in; k++) in = z->named[ra_map_find(&z->node, &node[k])];
     if (in) give(z, i, boundary);
   }
   if (z->node.key.count) memset(z->named, 0, (size_t)z->node.key.count);
@@ -307,7 +307,7 @@ static rcgns_status give_list(bc_zone *z, int64_t node, bc_where where, int32_t 
   enum { PIECE = BLOCK / 3 * 3 };
   const rc_node *n      = rc_node_at(&z->file->tree, node);
   const rc_box   box    = rc_whole(n);
-  int64_t       *block  = rc_alloc(PIECE, sizeof *block);
+  int64_t       *block  = ra_alloc(PIECE, sizeof *block);
   rcgns_status   status = rc_agree(z->file->comm, block ? RCGNS_OK : rc_no_memory(message), message);
 
   for (int64_t lo = 0; lo < rc_count(n) && status == RCGNS_OK; lo += PIECE) {
@@ -398,8 +398,8 @@ static int32_t boundary_of(rcgns_file *file, const char *name, const char *type)
   if (i < file->boundary_name.count) return (int32_t)i;
   keep[0] = rc_keep(file, "%s", name);
   keep[1] = rc_keep(file, "%s", type);
-  if (!keep[0] || !keep[1] || !rc_reserve(&file->boundary_name, 1, sizeof *keep) ||
-      !rc_reserve(&file->boundary_type, 1, sizeof *keep))
+  if (!keep[0] || !keep[1] || !ra_reserve(&file->boundary_name, 1, sizeof *keep) ||
+      !ra_reserve(&file->boundary_type, 1, sizeof *keep))
     return -1;
   ((const char **)file->boundary_name.item)[file->boundary_name.count++] = keep[0];
   ((const char **)file->boundary_type.item)[file->boundary_type.count++] = keep[1];
@@ -453,12 +453,12 @@ static rcgns_status unname_inner(bc_zone *z, rcgns_message *message)
   for (int64_t i = 0; i < z->num && count; i++)
     if (is_claimed(z, i, &one)) count[one.key[0] % size]++, num++;
   for (int r = 1; r < size && count; r++) count[size + r] = count[size + r - 1] + count[r - 1];
-  if (!(send = rc_alloc(num, sizeof *send))) status = rc_no_memory(message);
+  if (!(send = ra_alloc(num, sizeof *send))) status = rc_no_memory(message);
   for (int64_t i = 0; i < z->num && status == RCGNS_OK; i++)
     if (is_claimed(z, i, &one)) send[count[size + one.key[0] % size]++] = one;
   RC_GOTO(done, status = rc_exchange(z->file->comm, status, send, count, sizeof *send, &got, recv, message));
   for (int r = 0; r < size; r++) total += recv[r];
-  if (!(twice = rc_alloc(total, sizeof *twice))) status = rc_no_memory(message);
+  if (!(twice = ra_alloc(total, sizeof *twice))) status = rc_no_memory(message);
   else find_twice(got, total, twice);
   RC_GOTO(done, status = rc_exchange(z->file->comm, status, twice, recv, sizeof *twice, &back, count, message));
   for (int64_t i = 0, r = 0; r < size; i += count[r++]) count[size + r] = i;
@@ -557,7 +557,7 @@ rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgn
 
   message->text[0] = 0;
   if (!file->face_boundary) {
-    file->face_boundary = rc_alloc(file->mesh.num_faces, sizeof *file->face_boundary);
+    file->face_boundary = ra_alloc(file->mesh.num_faces, sizeof *file->face_boundary);
     status              = rc_agree(file->comm, file->face_boundary ? RCGNS_OK : rc_no_memory(message), message);
     for (int64_t f = 0; f < file->mesh.num_faces && status == RCGNS_OK; f++) file->face_boundary[f] = -1;
     for (int64_t z = 0, at = 0; z < file->num_zones && status == RCGNS_OK; z++) {

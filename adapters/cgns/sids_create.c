@@ -10,9 +10,9 @@
 
 void *rc_draft_own(rc_draft *d, int64_t count, size_t size)
 {
-  void *item = rc_alloc(count, size);
+  void *item = ra_alloc(count, size);
 
-  if (!item || !rc_reserve(&d->owned, 1, sizeof item)) {
+  if (!item || !ra_reserve(&d->owned, 1, sizeof item)) {
     free(item);
     d->ok = false;
     return NULL;
@@ -52,7 +52,7 @@ void rc_draft_drop(rc_draft *d)
 {
   rc_plan_drop(&d->plan);
   for (int64_t i = 0; i < d->owned.count; i++) free(((void **)d->owned.item)[i]);
-  rc_drop(&d->owned);
+  ra_drop(&d->owned);
 }
 
 /* ---- small files -------------------------------------------------------------------------------------------------- */

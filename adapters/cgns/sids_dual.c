@@ -27,7 +27,7 @@ typedef struct facet {
 
 /* The facets under way to each rank. */
 typedef struct outbox {
-  rc_array *to; /* [ranks] facet */
+  ra_array *to; /* [ranks] facet */
   bool      ok; /* memory has lasted */
 } outbox;
 
@@ -71,11 +71,11 @@ static int by_value(const void *a, const void *b)
 
 static void send_facet(dual *d, int64_t vertex, int64_t beyond, const double *a, const double *b, const double *c)
 {
-  rc_array *box = d->out.to + rc_owner(d->num_vertices, vertex, d->file->size);
+  ra_array *box = d->out.to + ra_owner(d->num_vertices, vertex, d->file->size);
   facet    *f;
 
   if (!by_place(a, b) || !by_place(b, c) || !by_place(c, a)) return; /* without area it bounds nothing */
-  if (!rc_reserve(box, 1, sizeof *f)) {
+  if (!ra_reserve(box, 1, sizeof *f)) {
     d->out.ok = false;
     return;
   }
@@ -100,7 +100,7 @@ static void cut_face(dual *d, int64_t face, int sign, const double centre[3], co
 
     if (number[p] == number[q]) continue;
     send_facet(d, number[p], number[q], half, centre, middle);
-    if (rc_owner(d->num_vertices, number[p], d->file->size) != rc_owner(d->num_vertices, number[q], d->file->size))
+    if (ra_owner(d->num_vertices, number[p], d->file->size) != ra_owner(d->num_vertices, number[q], d->file->size))
       send_facet(d, number[q], number[p], half, middle, centre);
     if (!is_skin) continue;
     send_facet(d, number[p], -1, x, half, middle);
@@ -110,7 +110,7 @@ static void cut_face(dual *d, int64_t face, int sign, const double centre[3], co
 
 /* Vertices of faces or of a cell while their mean is taken. */
 typedef struct corners {
-  rc_array node, xyz;
+  ra_array node, xyz;
 } corners;
 
 static bool add_corners(corners *c, const rc_mesh *mesh, int64_t face)
@@ -118,7 +118,7 @@ static bool add_corners(corners *c, const rc_mesh *mesh, int64_t face)
   const int64_t *offset = mesh->face_offset.item, *node = mesh->face_node.item;
 
   for (int64_t k = offset[face]; k < offset[face + 1]; k++)
-    if (!rc_push(&c->node, node[k])) return false;
+    if (!ra_push_int(&c->node, node[k])) return false;
   return true;
 }
 
@@ -131,7 +131,7 @@ static bool mean_of_corners(corners *c, const rc_mesh *mesh, double mean[3])
   for (int64_t i = 0; i < c->node.count; i++)
     if (!i || node[i] != node[i - 1]) node[n++] = node[i];
   c->xyz.count = 0;
-  if (!n || !rc_reserve(&c->xyz, n, 3 * sizeof(double))) return false;
+  if (!n || !ra_reserve(&c->xyz, n, 3 * sizeof(double))) return false;
   for (int64_t i = 0; i < n; i++)
     memcpy((double *)c->xyz.item + 3 * i, (const double *)mesh->xyz.item + 3 * node[i], 3 * sizeof(double));
   mean_of(c->xyz.item, n, mean);
@@ -165,7 +165,7 @@ static bool list_faces(dual *d)
   const int64_t *side[2] = {mesh->face_owner.item, mesh->face_neighbour.item};
 
   d->cell_offset = calloc((size_t)cells + 2, sizeof *d->cell_offset);
-  d->cell_face   = rc_alloc(2 * faces, sizeof *d->cell_face);
+  d->cell_face   = ra_alloc(2 * faces, sizeof *d->cell_face);
   if (!d->cell_offset || !d->cell_face) return false;
   for (int s = 0; s < 2; s++)
     for (int64_t f = 0; f < faces; f++)
@@ -182,7 +182,7 @@ static bool cut_cells(dual *d)
 {
   const rc_mesh *mesh  = &d->file->build;
   const int64_t  faces = mesh->face_owner.count;
-  double(*middle)[3]   = rc_alloc(faces, sizeof *middle);
+  double(*middle)[3]   = ra_alloc(faces, sizeof *middle);
   corners c            = {.node = {.item = NULL}, .xyz = {.item = NULL}};
   bool    ok           = middle && list_faces(d);
 
@@ -191,8 +191,8 @@ static bool cut_cells(dual *d)
     ok           = add_corners(&c, mesh, f) && mean_of_corners(&c, mesh, middle[f]);
   }
   for (int64_t cell = 0; cell < mesh->cell_global.count && ok; cell++) ok = cut_cell(d, cell, (const double(*)[3])middle, &c);
-  rc_drop(&c.node);
-  rc_drop(&c.xyz);
+  ra_drop(&c.node);
+  ra_drop(&c.xyz);
   free(middle);
   return ok;
 }
@@ -246,7 +246,7 @@ static bool cancel_skin(const facet *f, int64_t n, bool *is_gone)
   int64_t num = 0;
 
   for (int64_t i = 0; i < n; i++) num += f[i].beyond < 0;
-  if (!(s = rc_alloc(num, sizeof *s))) return false;
+  if (!(s = ra_alloc(num, sizeof *s))) return false;
   num = 0;
   for (int64_t i = 0; i < n; i++)
     if (f[i].beyond < 0) s[num++] = skin_of(f + i, i);
@@ -265,20 +265,20 @@ static bool cancel_skin(const facet *f, int64_t n, bool *is_gone)
 }
 
 /* The node of a mesh at a point. -1: no memory. */
-static int64_t node_at(rc_mesh *mesh, rc_map *nodes, const double x[3])
+static int64_t node_at(rc_mesh *mesh, ra_map *nodes, const double x[3])
 {
   int64_t key[3], node;
 
   memcpy(key, x, sizeof key);
-  node = rc_map_add(nodes, key);
+  node = ra_map_add(nodes, key);
   if (node < mesh->xyz.count) return node;
-  if (!rc_reserve(&mesh->xyz, 1, 3 * sizeof *x)) return -1;
+  if (!ra_reserve(&mesh->xyz, 1, 3 * sizeof *x)) return -1;
   memcpy((double *)mesh->xyz.item + 3 * mesh->xyz.count++, x, 3 * sizeof *x);
   return node;
 }
 
 /* The dual cells of this rank from their facets; has_face [hi - lo] says which have any. */
-static bool gather(const dual *d, const facet *f, int64_t n, const bool *is_gone, rc_mesh *mesh, rc_map *nodes, bool *has_face)
+static bool gather(const dual *d, const facet *f, int64_t n, const bool *is_gone, rc_mesh *mesh, ra_map *nodes, bool *has_face)
 {
   for (int64_t i = 0; i < n; i++) {
     const bool is_mine = f[i].beyond >= d->lo && f[i].beyond < d->hi;
@@ -292,7 +292,7 @@ static bool gather(const dual *d, const facet *f, int64_t n, const bool *is_gone
     if (!rc_face_add(mesh, loop, 3, false, f[i].vertex - d->lo, is_mine ? f[i].beyond - d->lo : -1)) return false;
   }
   for (int64_t v = d->lo; v < d->hi; v++)
-    if (!rc_push(&mesh->cell_global, v)) return false;
+    if (!ra_push_int(&mesh->cell_global, v)) return false;
   return true;
 }
 
@@ -305,25 +305,25 @@ static rcgns_status add_loose(const dual *d, rc_mesh *mesh, const bool *has_face
     const rc_zone *zone = d->file->zone + z;
     const int64_t  lo   = rc_clamp(d->lo - zone->first_node, 0, zone->num_nodes),
                   hi    = rc_clamp(d->hi - zone->first_node, lo, zone->num_nodes);
-    rc_array loose      = {.item = NULL};
+    ra_array loose      = {.item = NULL};
     double  *xyz        = NULL;
 
     if (zone->is_structured) continue;
     for (int64_t v = lo; v < hi && status == RCGNS_OK; v++)
-      if (!has_face[zone->first_node + v - d->lo] && !rc_push(&loose, v)) status = rc_no_memory(message);
-    if (status == RCGNS_OK && !(xyz = rc_alloc(3 * loose.count, sizeof *xyz))) status = rc_no_memory(message);
+      if (!has_face[zone->first_node + v - d->lo] && !ra_push_int(&loose, v)) status = rc_no_memory(message);
+    if (status == RCGNS_OK && !(xyz = ra_alloc(3 * loose.count, sizeof *xyz))) status = rc_no_memory(message);
     status = rc_nodes_fetch(d->file, status, zone, loose.item, loose.count, xyz, NULL, message);
     for (int64_t i = 0; i < loose.count && status == RCGNS_OK; i++) {
       const int64_t node = mesh->xyz.count, loop[3] = {node, node, node};
       const int64_t cell = zone->first_node + ((const int64_t *)loose.item)[i] - d->lo;
 
-      if (!rc_reserve(&mesh->xyz, 1, 3 * sizeof *xyz)) status = rc_no_memory(message);
+      if (!ra_reserve(&mesh->xyz, 1, 3 * sizeof *xyz)) status = rc_no_memory(message);
       if (status != RCGNS_OK) break;
       memcpy((double *)mesh->xyz.item + 3 * mesh->xyz.count++, xyz + 3 * i, 3 * sizeof *xyz);
       if (!rc_face_add(mesh, loop, 3, false, cell, -1)) status = rc_no_memory(message);
     }
     free(xyz);
-    rc_drop(&loose);
+    ra_drop(&loose);
     RC_TRY(rc_agree(d->file->comm, status, message));
   }
   return RCGNS_OK;
@@ -338,12 +338,12 @@ static facet *pack(dual *d, int64_t *count)
   facet  *all;
 
   for (int r = 0; r < d->file->size; r++) total += count[r] = d->out.to[r].count;
-  if (!(all = rc_alloc(total, sizeof *all))) return NULL;
+  if (!(all = ra_alloc(total, sizeof *all))) return NULL;
   total = 0;
   for (int r = 0; r < d->file->size; r++) {
     if (count[r]) memcpy(all + total, d->out.to[r].item, (size_t)count[r] * sizeof *all);
     total += count[r];
-    rc_drop(&d->out.to[r]);
+    ra_drop(&d->out.to[r]);
   }
   return all;
 }
@@ -363,7 +363,7 @@ static rcgns_status exchange(dual *d, facet **received, int64_t *num, rcgns_mess
   *num   = 0;
   for (int r = 0; r < d->file->size && status == RCGNS_OK; r++) *num += count[d->file->size + r];
   *received = in;
-  for (int r = 0; r < d->file->size && d->out.to; r++) rc_drop(&d->out.to[r]);
+  for (int r = 0; r < d->file->size && d->out.to; r++) ra_drop(&d->out.to[r]);
   free(d->out.to);
   free(d->cell_offset);
   free(d->cell_face);
@@ -398,18 +398,18 @@ rcgns_status rc_dual_build(rcgns_file *file, rcgns_message *message)
   const rc_zone *last     = file->zone + file->num_zones - 1;
   dual           d        = {.file = file, .num_vertices = last->first_node + last->num_nodes};
   rc_mesh        mesh     = {.xyz = {.item = NULL}};
-  rc_map         nodes    = {.width = 3};
+  ra_map         nodes    = {.width = 3};
   facet         *received = NULL;
   bool          *is_gone = NULL, *has_face = NULL;
   int64_t        num;
   rcgns_status   status;
 
-  d.lo = rc_share(d.num_vertices, file->rank, file->size);
-  d.hi = rc_share(d.num_vertices, file->rank + 1, file->size);
+  d.lo = ra_share(d.num_vertices, file->rank, file->size);
+  d.hi = ra_share(d.num_vertices, file->rank + 1, file->size);
   RC_GOTO(done, status = exchange(&d, &received, &num, message));
   is_gone  = calloc((size_t)num + 1, sizeof *is_gone);
   has_face = calloc((size_t)(d.hi - d.lo) + 1, sizeof *has_face);
-  if (!is_gone || !has_face || !rc_push(&mesh.face_offset, 0) || !cancel_skin(received, num, is_gone) ||
+  if (!is_gone || !has_face || !ra_push_int(&mesh.face_offset, 0) || !cancel_skin(received, num, is_gone) ||
       !gather(&d, received, num, is_gone, &mesh, &nodes, has_face))
     status = rc_no_memory(message);
   RC_GOTO(done, status = rc_agree(file->comm, status, message));
@@ -417,7 +417,7 @@ rcgns_status rc_dual_build(rcgns_file *file, rcgns_message *message)
   take_place(&d, &mesh);
 done:
   rc_mesh_drop(&mesh);
-  rc_map_drop(&nodes);
+  ra_map_drop(&nodes);
   free(received);
   free(is_gone);
   free(has_face);

@@ -27,20 +27,20 @@ static const struct {
 
 /* The standard elements of this rank in one zone. */
 typedef struct elements {
-  rc_array cell;   /* int64_t: number in the zone */
-  rc_array shape;  /* int64_t: rc_shape */
-  rc_array corner; /* int64_t [count][MAX_CORNERS] node in the zone, later in this rank's mesh; the rest is -1 */
-  rc_map   node;   /* node in the zone -> in the order they come */
+  ra_array cell;   /* int64_t: number in the zone */
+  ra_array shape;  /* int64_t: rc_shape */
+  ra_array corner; /* int64_t [count][MAX_CORNERS] node in the zone, later in this rank's mesh; the rest is -1 */
+  ra_map   node;   /* node in the zone -> in the order they come */
   uint8_t *shared; /* [nodes] other ranks have it too */
   int64_t  base;   /* index in this rank's mesh of its first node */
 } elements;
 
 static void drop_elements(elements *e)
 {
-  rc_drop(&e->cell);
-  rc_drop(&e->shape);
-  rc_drop(&e->corner);
-  rc_map_drop(&e->node);
+  ra_drop(&e->cell);
+  ra_drop(&e->shape);
+  ra_drop(&e->corner);
+  ra_map_drop(&e->node);
   free(e->shared);
 }
 
@@ -56,7 +56,7 @@ static rcgns_status add_element(const rcgns_file *file, const rc_zone *zone, ele
                      "%s: zone %s: cell %lld refers to node %lld, but there are %lld: the mesh is damaged", file->path,
                      zone->name, (long long)cell + 1, (long long)node[i], (long long)zone->num_nodes);
   }
-  if (!rc_push(&e->cell, cell) || !rc_push(&e->shape, (int64_t)shape) || !rc_reserve(&e->corner, 1, sizeof corner))
+  if (!ra_push_int(&e->cell, cell) || !ra_push_int(&e->shape, (int64_t)shape) || !ra_reserve(&e->corner, 1, sizeof corner))
     return rc_no_memory(message);
   memcpy((int64_t *)e->corner.item + MAX_CORNERS * e->corner.count++, corner, sizeof corner);
   return RCGNS_OK;
@@ -66,7 +66,7 @@ static rcgns_status add_element(const rcgns_file *file, const rc_zone *zone, ele
 static rcgns_status read_fixed(rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t lo, int64_t hi, elements *e,
                                rcgns_message *message)
 {
-  int64_t     *node   = rc_alloc((hi - lo) * s->npe, sizeof *node);
+  int64_t     *node   = ra_alloc((hi - lo) * s->npe, sizeof *node);
   rcgns_status status = node ? RCGNS_OK : rc_no_memory(message);
 
   status = rc_read_1d(file, status, s->connectivity, (s->row_lo + lo) * s->npe, (s->row_lo + hi) * s->npe, 'I', node, message);
@@ -80,7 +80,7 @@ static rcgns_status read_fixed(rcgns_file *file, const rc_zone *zone, const rc_s
 static rcgns_status read_mixed(rcgns_file *file, const rc_zone *zone, const rc_section *s, int64_t lo, int64_t hi, elements *e,
                                rcgns_message *message)
 {
-  rc_array     offset = {.item = NULL}, data = {.item = NULL};
+  ra_array     offset = {.item = NULL}, data = {.item = NULL};
   rc_cut       cut[2] = {{0, 0, 0}, {-RC_CUT, 0, 0}};
   const int64_t end[2] = {lo, hi - 1};
   int64_t      cell, row_lo, row_hi;
@@ -100,15 +100,15 @@ static rcgns_status read_mixed(rcgns_file *file, const rc_zone *zone, const rc_s
     if (cell >= lo && cell < hi) status = add_element(file, zone, e, s->first_cell + cell, shape, row + 1, message);
     cell++;
   }
-  rc_drop(&offset);
-  rc_drop(&data);
+  ra_drop(&offset);
+  ra_drop(&data);
   return rc_agree(file->comm, status, message);
 }
 
 /* Number the nodes, fetch their coordinates. Collective. */
 static rcgns_status locate(rcgns_file *file, const rc_zone *zone, elements *e, rcgns_message *message)
 {
-  rc_array    *xyz    = &file->build.xyz;
+  ra_array    *xyz    = &file->build.xyz;
   int64_t     *corner = e->corner.item;
   rcgns_status status = RCGNS_OK;
   int64_t      n;
@@ -117,12 +117,12 @@ static rcgns_status locate(rcgns_file *file, const rc_zone *zone, elements *e, r
   e->node.width = 1;
   for (int64_t i = 0; i < MAX_CORNERS * e->corner.count && status == RCGNS_OK; i++) {
     if (corner[i] < 0) continue;
-    corner[i] = rc_map_add(&e->node, &corner[i]);
+    corner[i] = ra_map_add(&e->node, &corner[i]);
     if (corner[i] < 0) status = rc_no_memory(message);
   }
   n         = e->node.key.count;
-  e->shared = rc_alloc(n, 1);
-  if (status == RCGNS_OK && !(e->shared && rc_reserve(xyz, n, 3 * sizeof(double)))) status = rc_no_memory(message);
+  e->shared = ra_alloc(n, 1);
+  if (status == RCGNS_OK && !(e->shared && ra_reserve(xyz, n, 3 * sizeof(double)))) status = rc_no_memory(message);
   for (int64_t i = 0; i < n && status == RCGNS_OK; i++)
     if (!rc_number_node(file, zone, ((const int64_t *)e->node.key.item)[i])) status = rc_no_memory(message);
   RC_TRY(rc_nodes_fetch(file, status, zone, e->node.key.item, n, (double *)xyz->item + 3 * xyz->count, e->shared, message));
@@ -168,20 +168,20 @@ static bool is_opposite(const int64_t *a, int n, const int64_t *b, int m)
 
 /* Faces that join by their nodes. For each set of nodes: up to two sides, MAX_FACES * element + face. */
 typedef struct joints {
-  rc_map   set;
-  rc_array side;  /* int64_t [sets][2], -1: none */
-  rc_array alone; /* int64_t: sides that fold back on their own cell */
+  ra_map   set;
+  ra_array side;  /* int64_t [sets][2], -1: none */
+  ra_array alone; /* int64_t: sides that fold back on their own cell */
 } joints;
 
 static rcgns_status join_side(const rcgns_file *file, const rc_zone *zone, const elements *e, joints *j, int64_t side,
                               const int64_t key[4], rcgns_message *message)
 {
   const int64_t *cell = e->cell.item;
-  const int64_t  set  = rc_map_add(&j->set, key);
+  const int64_t  set  = ra_map_add(&j->set, key);
   int64_t       *both;
 
   if (set < 0) return rc_no_memory(message);
-  if (set == j->side.count / 2 && !(rc_push(&j->side, -1) && rc_push(&j->side, -1))) return rc_no_memory(message);
+  if (set == j->side.count / 2 && !(ra_push_int(&j->side, -1) && ra_push_int(&j->side, -1))) return rc_no_memory(message);
   both = (int64_t *)j->side.item + 2 * set;
   if (both[0] >= 0 && both[1] >= 0)
     return rc_fail(message, RCGNS_GEOMETRY,
@@ -209,7 +209,7 @@ static rcgns_status join(const rcgns_file *file, const rc_zone *zone, const elem
       for (int g = 0; g < num; g++) folded = folded || (g != f && !memcmp(key[f], key[g], sizeof key[f]));
       if (!folded)
         RC_TRY(join_side(file, zone, e, j, MAX_FACES * i + f, key[f], message));
-      else if (!rc_push(&j->alone, MAX_FACES * i + f))
+      else if (!ra_push_int(&j->alone, MAX_FACES * i + f))
         return rc_no_memory(message);
     }
   }
@@ -289,7 +289,7 @@ static rcgns_status check_shared(rcgns_file *file, const rc_zone *zone, const el
 
   for (int64_t s = 0; s < sets && count; s++)
     if (claim_of(e, j, s, &one)) count[one.key[0] % file->size]++, num++;
-  if (!(send = rc_alloc(num, sizeof *send))) status = rc_no_memory(message);
+  if (!(send = ra_alloc(num, sizeof *send))) status = rc_no_memory(message);
   for (int r = 1; r < file->size && count; r++) count[file->size + r] = count[file->size + r - 1] + count[r - 1];
   for (int64_t s = 0; s < sets && status == RCGNS_OK; s++)
     if (claim_of(e, j, s, &one)) send[count[file->size + one.key[0] % file->size]++] = one;
@@ -337,9 +337,9 @@ static rcgns_status build_elements(rcgns_file *file, const rc_zone *zone, elemen
       status = rc_agree(file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
     }
   }
-  rc_map_drop(&j.set);
-  rc_drop(&j.side);
-  rc_drop(&j.alone);
+  ra_map_drop(&j.set);
+  ra_drop(&j.side);
+  ra_drop(&j.alone);
   return status;
 }
 

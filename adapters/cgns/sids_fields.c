@@ -342,7 +342,7 @@ static bool core_of(const rcgns_file *file, const rc_zone *zone, int64_t solutio
 }
 
 /* Add the fields of one zone that are not yet known. */
-static rcgns_status add_fields(rcgns_file *file, int64_t zone, rc_array *fields, rcgns_message *message)
+static rcgns_status add_fields(rcgns_file *file, int64_t zone, ra_array *fields, rcgns_message *message)
 {
   for (int64_t at = -1; file->solution[zone] >= 0 && (at = next_field(&file->tree, file->solution[zone], at)) >= 0;) {
     const rc_node *n     = rc_node_at(&file->tree, at);
@@ -353,7 +353,7 @@ static rcgns_status add_fields(rcgns_file *file, int64_t zone, rc_array *fields,
     if (known) continue;
     if (n->type[0] == 'U') field.stored = n->type[1] == '4' ? "I4" : "I8";
     field.nature = rcgns_nature(n->name, field.is_integer, &field.nature_known);
-    if (!rc_reserve(fields, 1, sizeof field)) return rc_no_memory(message);
+    if (!ra_reserve(fields, 1, sizeof field)) return rc_no_memory(message);
     ((rcgns_field *)fields->item)[fields->count++] = field;
   }
   return RCGNS_OK;
@@ -362,7 +362,7 @@ static rcgns_status add_fields(rcgns_file *file, int64_t zone, rc_array *fields,
 /* All fields of the chosen nodes; with `optional`, those alone that every zone has in the right size. */
 static rcgns_status list_chosen(rcgns_file *file, bool optional, rcgns_message *message)
 {
-  rc_array     fields = {.item = NULL};
+  ra_array     fields = {.item = NULL};
   rcgns_field *f;
   int64_t      kept   = 0;
   rcgns_status status = RCGNS_OK;
@@ -451,7 +451,7 @@ static rcgns_status find_field(const rcgns_file *file, const char *name, int64_t
 
 rcgns_status rcgns_read_field(rcgns_file *file, const char *name, double *values, rcgns_message *message)
 {
-  int64_t     *array  = rc_alloc(file->num_zones, sizeof *array);
+  int64_t     *array  = ra_alloc(file->num_zones, sizeof *array);
   rcgns_status status = array ? find_field(file, name, array, message) : rc_no_memory(message);
 
   status = rc_agree(file->comm, status, message);
@@ -494,7 +494,7 @@ static int64_t find_cells(const rcgns_file *file, int64_t z, const char *name)
 
 rcgns_status rcgns_read_cells(rcgns_file *file, const char *name, double *values, rcgns_message *message)
 {
-  int64_t     *array  = rc_alloc(file->num_zones, sizeof *array);
+  int64_t     *array  = ra_alloc(file->num_zones, sizeof *array);
   rcgns_status status = array ? RCGNS_OK : rc_no_memory(message);
 
   for (int64_t z = 0; z < file->num_zones && status == RCGNS_OK; z++) {

@@ -14,22 +14,22 @@ bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, in
 {
   int64_t *loop;
 
-  if (!rc_reserve(&mesh->face_node, n, sizeof *loop)) return false;
+  if (!ra_reserve(&mesh->face_node, n, sizeof *loop)) return false;
   loop = (int64_t *)mesh->face_node.item + mesh->face_node.count;
   for (int64_t i = 0; i < n; i++) loop[i] = node[reverse ? n - 1 - i : i];
   mesh->face_node.count += n;
-  return rc_push(&mesh->face_offset, mesh->face_node.count) && rc_push(&mesh->face_owner, owner) &&
-         rc_push(&mesh->face_neighbour, neighbour);
+  return ra_push_int(&mesh->face_offset, mesh->face_node.count) && ra_push_int(&mesh->face_owner, owner) &&
+         ra_push_int(&mesh->face_neighbour, neighbour);
 }
 
 bool rc_number_node(rcgns_file *file, const rc_zone *zone, int64_t node)
 {
-  return !rc_is_dual(file) || rc_push(&file->build.node_number, zone->first_node + node);
+  return !rc_is_dual(file) || ra_push_int(&file->build.node_number, zone->first_node + node);
 }
 
 bool rc_rim_add(rc_mesh *mesh, const rc_zone *zone, int64_t a, int64_t b, int64_t c, int64_t d)
 {
-  if (!rc_reserve(&mesh->rim, 1, sizeof(rc_rim))) return false;
+  if (!ra_reserve(&mesh->rim, 1, sizeof(rc_rim))) return false;
   ((rc_rim *)mesh->rim.item)[mesh->rim.count++] =
       (rc_rim){.face = mesh->face_owner.count - 1, .zone = zone->node, .key = {a, b, c, d}};
   return true;
@@ -136,9 +136,9 @@ static rcgns_status read_patch(rcgns_file *file, rcgns_status mine, const rc_zon
 
 static rcgns_status patch_nodes(rcgns_file *file, const rc_zone *zone, const patch *p, rcgns_message *message)
 {
-  rc_array    *xyz    = &file->build.xyz;
-  double      *x      = rc_alloc(3 * p->count, sizeof *x);
-  rcgns_status status = x && rc_reserve(xyz, p->count, 3 * sizeof *x) ? RCGNS_OK : rc_no_memory(message);
+  ra_array    *xyz    = &file->build.xyz;
+  double      *x      = ra_alloc(3 * p->count, sizeof *x);
+  rcgns_status status = x && ra_reserve(xyz, p->count, 3 * sizeof *x) ? RCGNS_OK : rc_no_memory(message);
 
   for (int d = 0; d < 3; d++) {
     double *at = x ? x + d * p->count : NULL;
@@ -250,27 +250,27 @@ rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *
                             double *xyz, uint8_t *shared, rcgns_message *message)
 {
   const int64_t total = zone->num_nodes;
-  const int64_t lo = rc_share(total, file->rank, file->size), hi = rc_share(total, file->rank + 1, file->size);
+  const int64_t lo = ra_share(total, file->rank, file->size), hi = ra_share(total, file->rank + 1, file->size);
   int64_t      *count = calloc(3 * (size_t)file->size, sizeof *count), *next = count ? count + file->size : NULL;
-  int64_t      *sorted = rc_alloc(n, sizeof *sorted), *place_of = rc_alloc(n, sizeof *place_of),
+  int64_t      *sorted = ra_alloc(n, sizeof *sorted), *place_of = ra_alloc(n, sizeof *place_of),
           *recv      = count ? count + 2 * file->size : NULL;
-  double      *x     = rc_alloc(3 * (hi - lo), sizeof *x);
+  double      *x     = ra_alloc(3 * (hi - lo), sizeof *x);
   void        *asked = NULL, *back = NULL;
   located     *reply     = NULL;
   int64_t      num_asked = 0;
   rcgns_status status    = mine;
 
   if (status == RCGNS_OK && !(count && sorted && place_of && x)) status = rc_no_memory(message);
-  for (int64_t i = 0; i < n && status == RCGNS_OK; i++) count[rc_owner(total, node[i], file->size)]++;
+  for (int64_t i = 0; i < n && status == RCGNS_OK; i++) count[ra_owner(total, node[i], file->size)]++;
   for (int r = 1; r < file->size && status == RCGNS_OK; r++) next[r] = next[r - 1] + count[r - 1];
   for (int64_t i = 0; i < n && status == RCGNS_OK; i++) {
-    place_of[i]         = next[rc_owner(total, node[i], file->size)]++;
+    place_of[i]         = next[ra_owner(total, node[i], file->size)]++;
     sorted[place_of[i]] = node[i];
   }
   RC_GOTO(done, status = rc_exchange(file->comm, status, sorted, count, sizeof *sorted, &asked, recv, message));
   RC_GOTO(done, status = read_slab(file, RCGNS_OK, zone, lo, hi, x, message));
   for (int r = 0; r < file->size; r++) num_asked += recv[r];
-  reply  = rc_alloc(num_asked, sizeof *reply);
+  reply  = ra_alloc(num_asked, sizeof *reply);
   status = reply ? answer(file, zone, lo, hi - lo, x, asked, num_asked, reply, message) : rc_no_memory(message);
   RC_GOTO(done, status = rc_exchange(file->comm, status, reply, recv, sizeof *reply, &back, count, message));
   for (int64_t i = 0; i < n; i++) {
@@ -328,14 +328,14 @@ static rcgns_status orient_zones(rcgns_file *file, const int64_t *first_face, rc
 static rcgns_status build_zone(rcgns_file *file, int64_t z, rcgns_message *message)
 {
   const rc_zone *zone  = file->zone + z;
-  rc_array      *cells = &file->build.cell_global;
+  ra_array      *cells = &file->build.cell_global;
   const int64_t  first = cells->count;
   const int64_t  lo    = rc_clamp(file->cell_lo - zone->first_cell, 0, zone->num_cells),
                 hi     = rc_clamp(file->cell_hi - zone->first_cell, lo, zone->num_cells);
   rcgns_status status  = RCGNS_OK;
 
   for (int64_t c = lo; c < hi && status == RCGNS_OK; c++)
-    if (!rc_push(cells, zone->first_cell + c)) status = rc_no_memory(message);
+    if (!ra_push_int(cells, zone->first_cell + c)) status = rc_no_memory(message);
   RC_TRY(rc_agree(file->comm, status, message));
   return zone->is_structured ? build_block(file, zone, lo, hi, first, message)
                              : rc_sections_build(file, zone, lo, hi, first, message);
@@ -344,8 +344,8 @@ static rcgns_status build_zone(rcgns_file *file, int64_t z, rcgns_message *messa
 rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message)
 {
   rc_mesh     *build      = &file->build;
-  int64_t     *first_face = rc_alloc(file->num_zones + 1, sizeof *first_face);
-  rcgns_status status     = first_face && rc_push(&build->face_offset, 0) ? RCGNS_OK : rc_no_memory(message);
+  int64_t     *first_face = ra_alloc(file->num_zones + 1, sizeof *first_face);
+  rcgns_status status     = first_face && ra_push_int(&build->face_offset, 0) ? RCGNS_OK : rc_no_memory(message);
 
   status = rc_agree(file->comm, status, message);
   for (int64_t z = 0; z < file->num_zones && status == RCGNS_OK; z++) {
@@ -381,13 +381,13 @@ void rc_mesh_view(rcgns_file *file)
 
 void rc_mesh_drop(rc_mesh *mesh)
 {
-  rc_drop(&mesh->xyz);
-  rc_drop(&mesh->node_number);
-  rc_drop(&mesh->face_offset);
-  rc_drop(&mesh->face_node);
-  rc_drop(&mesh->face_owner);
-  rc_drop(&mesh->face_neighbour);
-  rc_drop(&mesh->cell_global);
-  rc_drop(&mesh->rim);
-  rc_drop(&mesh->rim_node);
+  ra_drop(&mesh->xyz);
+  ra_drop(&mesh->node_number);
+  ra_drop(&mesh->face_offset);
+  ra_drop(&mesh->face_node);
+  ra_drop(&mesh->face_owner);
+  ra_drop(&mesh->face_neighbour);
+  ra_drop(&mesh->cell_global);
+  ra_drop(&mesh->rim);
+  ra_drop(&mesh->rim_node);
 }

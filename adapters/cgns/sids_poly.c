@@ -13,28 +13,28 @@
 typedef struct polys {
   int64_t  num_cells;
   int64_t  number;        /* in the zone, of the first cell */
-  rc_array offset;        /* [num_cells + 1] */
-  rc_array face;          /* face of the zone, later of `faces` below */
-  rc_array sign;          /* 1: its normal points out of the cell; -1: into it; 0: listed twice, bounds nothing */
-  rc_map   faces;         /* face of the zone -> local face */
-  rc_array ref;           /* [local faces][2] where in `face` the cells that have it list it, -1 */
-  rc_array loop_at, loop; /* [local faces + 1], nodes: of the zone, later of this rank's mesh */
-  rc_map   nodes;         /* node of the zone -> node of this rank's mesh less first_node */
+  ra_array offset;        /* [num_cells + 1] */
+  ra_array face;          /* face of the zone, later of `faces` below */
+  ra_array sign;          /* 1: its normal points out of the cell; -1: into it; 0: listed twice, bounds nothing */
+  ra_map   faces;         /* face of the zone -> local face */
+  ra_array ref;           /* [local faces][2] where in `face` the cells that have it list it, -1 */
+  ra_array loop_at, loop; /* [local faces + 1], nodes: of the zone, later of this rank's mesh */
+  ra_map   nodes;         /* node of the zone -> node of this rank's mesh less first_node */
   int64_t  first_node;
 } polys;
 
-static int64_t *ints_of(const rc_array *array) { return array->item; }
+static int64_t *ints_of(const ra_array *array) { return array->item; }
 
 static void drop_polys(polys *p)
 {
-  rc_drop(&p->offset);
-  rc_drop(&p->face);
-  rc_drop(&p->sign);
-  rc_map_drop(&p->faces);
-  rc_map_drop(&p->nodes);
-  rc_drop(&p->ref);
-  rc_drop(&p->loop_at);
-  rc_drop(&p->loop);
+  ra_drop(&p->offset);
+  ra_drop(&p->face);
+  ra_drop(&p->sign);
+  ra_map_drop(&p->faces);
+  ra_map_drop(&p->nodes);
+  ra_drop(&p->ref);
+  ra_drop(&p->loop_at);
+  ra_drop(&p->loop);
 }
 
 /* The face of the zone with that element number, -1: none. */
@@ -68,7 +68,7 @@ static rcgns_status read_nface(rcgns_file *file, const rc_zone *zone, const rc_s
   int64_t      *face   = p->face.item;
 
   RC_TRY(status);
-  if (!rc_reserve(&p->sign, p->face.count, sizeof *face)) status = rc_no_memory(message);
+  if (!ra_reserve(&p->sign, p->face.count, sizeof *face)) status = rc_no_memory(message);
   for (int64_t c = 0; c < hi - lo && status == RCGNS_OK; c++)
     for (int64_t i = ints_of(&p->offset)[c]; i < ints_of(&p->offset)[c + 1] && status == RCGNS_OK; i++) {
       const int64_t number = face[i];
@@ -88,14 +88,14 @@ typedef struct side {
 } side;
 
 /* This rank's share of the parents of one NGON_n section, appended to sides. Collective. */
-static rcgns_status read_parents(rcgns_file *file, const rc_zone *zone, const rc_section *s, rc_array *sides,
+static rcgns_status read_parents(rcgns_file *file, const rc_zone *zone, const rc_section *s, ra_array *sides,
                                  rcgns_message *message)
 {
   const int64_t n  = s->num_rows;
-  const int64_t lo = rc_share(n, file->rank, file->size), hi = rc_share(n, file->rank + 1, file->size), num = hi - lo;
+  const int64_t lo = ra_share(n, file->rank, file->size), hi = ra_share(n, file->rank + 1, file->size), num = hi - lo;
   const rc_box  box    = rc_whole(rc_node_at(&file->tree, s->parents));
-  int64_t      *parent = rc_alloc(2 * num, sizeof *parent);
-  rcgns_status  status = parent && rc_reserve(sides, 2 * num, sizeof(side)) ? RCGNS_OK : rc_no_memory(message);
+  int64_t      *parent = ra_alloc(2 * num, sizeof *parent);
+  rcgns_status  status = parent && ra_reserve(sides, 2 * num, sizeof(side)) ? RCGNS_OK : rc_no_memory(message);
 
   RC_GOTO(done, status = rc_read(file, status, s->parents, &box, lo, hi, 'I', parent, message));
   RC_GOTO(done, status = rc_read(file, RCGNS_OK, s->parents, &box, n + lo, n + hi, 'I', parent + num, message));
@@ -129,7 +129,7 @@ static int by_cell_face(const void *a, const void *b)
 static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64_t lo, int64_t hi, polys *p,
                                     rcgns_message *message)
 {
-  rc_array     sides = {.item = NULL};
+  ra_array     sides = {.item = NULL};
   int64_t     *count = calloc(2 * (size_t)file->size, sizeof *count), total = 0;
   void        *got    = NULL;
   rcgns_status status = RCGNS_OK;
@@ -139,14 +139,14 @@ static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64
   if (status != RCGNS_OK) goto done;
   qsort(sides.item, (size_t)sides.count, sizeof(side), by_cell_face); /* cells ascend with the rank that owns them */
   for (int64_t i = 0; i < sides.count && count; i++)
-    count[rc_owner(file->num_cells, zone->first_cell + ((side *)sides.item)[i].cell, file->size)]++;
+    count[ra_owner(file->num_cells, zone->first_cell + ((side *)sides.item)[i].cell, file->size)]++;
   status = count ? RCGNS_OK : rc_no_memory(message);
   RC_GOTO(done, status = rc_exchange(file->comm, status, sides.item, count, sizeof(side), &got,
                                      count ? count + file->size : NULL, message));
   for (int r = 0; r < file->size; r++) total += count[file->size + r];
   qsort(got, (size_t)total, sizeof(side), by_cell_face);
-  if (!rc_reserve(&p->face, total, sizeof(int64_t)) || !rc_reserve(&p->sign, total, sizeof(int64_t)) ||
-      !rc_reserve(&p->offset, hi - lo + 1, sizeof(int64_t)))
+  if (!ra_reserve(&p->face, total, sizeof(int64_t)) || !ra_reserve(&p->sign, total, sizeof(int64_t)) ||
+      !ra_reserve(&p->offset, hi - lo + 1, sizeof(int64_t)))
     status = rc_no_memory(message);
   for (int64_t c = lo, i = 0; c <= hi && status == RCGNS_OK; c++) {
     while (i < total && ((const side *)got)[i].cell < c) i++;
@@ -158,7 +158,7 @@ static rcgns_status read_by_parents(rcgns_file *file, const rc_zone *zone, int64
   }
   status = rc_agree(file->comm, status, message);
 done:
-  rc_drop(&sides);
+  ra_drop(&sides);
   free(count);
   free(got);
   return status;
@@ -179,9 +179,10 @@ static rcgns_status number_faces(const rcgns_file *file, const rc_zone *zone, po
                      (long long)(p->number + c + 1), (long long)(offset[c + 1] - offset[c]));
     for (int64_t i = offset[c]; i < offset[c + 1]; i++) {
       int64_t      *face = ints_of(&p->face) + i, *ref;
-      const int64_t f    = rc_map_add(&p->faces, face);
+      const int64_t f    = ra_map_add(&p->faces, face);
 
-      if (f < 0 || (2 * f == p->ref.count && !(rc_push(&p->ref, -1) && rc_push(&p->ref, -1)))) return rc_no_memory(message);
+      if (f < 0 || (2 * f == p->ref.count && !(ra_push_int(&p->ref, -1) && ra_push_int(&p->ref, -1))))
+        return rc_no_memory(message);
       ref   = ints_of(&p->ref) + 2 * f;
       *face = f;
       if (ref[ref[1] >= 0] >= offset[c]) {
@@ -202,14 +203,14 @@ static rcgns_status number_faces(const rcgns_file *file, const rc_zone *zone, po
 /* A slab of the zone's faces. */
 typedef struct slab {
   int64_t  lo, hi;
-  rc_array at, end; /* [hi - lo] where the loop of a face lies in node */
-  rc_array node;
+  ra_array at, end; /* [hi - lo] where the loop of a face lies in node */
+  ra_array node;
 } slab;
 
 /* Collective. */
 static rcgns_status read_faces(rcgns_file *file, const rc_zone *zone, slab *s, rcgns_message *message)
 {
-  rc_array     offset = {.item = NULL}, data = {.item = NULL};
+  ra_array     offset = {.item = NULL}, data = {.item = NULL};
   rcgns_status status = RCGNS_OK;
 
   for (int64_t k = 0; k < zone->num_face_sections && status == RCGNS_OK; k++) {
@@ -219,16 +220,16 @@ static rcgns_status read_faces(rcgns_file *file, const rc_zone *zone, slab *s, r
     bool          ok;
 
     RC_GOTO(done, status = rc_rows_read(file, zone, f, lo, hi, &offset, &data, message));
-    ok = rc_reserve(&s->node, data.count, sizeof(int64_t));
+    ok = ra_reserve(&s->node, data.count, sizeof(int64_t));
     for (int64_t i = 0; i < hi - lo && ok; i++)
-      ok = rc_push(&s->at, base + ints_of(&offset)[i]) && rc_push(&s->end, base + ints_of(&offset)[i + 1]);
+      ok = ra_push_int(&s->at, base + ints_of(&offset)[i]) && ra_push_int(&s->end, base + ints_of(&offset)[i + 1]);
     if (ok && data.count) memcpy(ints_of(&s->node) + base, data.item, (size_t)data.count * sizeof(int64_t));
     s->node.count += data.count;
     status = rc_agree(file->comm, ok ? RCGNS_OK : rc_no_memory(message), message);
   }
 done:
-  rc_drop(&offset);
-  rc_drop(&data);
+  ra_drop(&offset);
+  ra_drop(&data);
   return status;
 }
 
@@ -238,7 +239,7 @@ typedef struct request {
 
 /* The lengths and nodes that answer the requests; nodes count from 0. */
 static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const slab *s, const request *asked, int64_t num,
-                           rc_array *length, rc_array *node, rcgns_message *message)
+                           ra_array *length, ra_array *node, rcgns_message *message)
 {
   int64_t     *first = calloc(2 * (size_t)(s->hi - s->lo) + 1, sizeof *first), *refs = first + (s->hi - s->lo);
   rcgns_status status = first ? RCGNS_OK : rc_no_memory(message);
@@ -253,7 +254,7 @@ static rcgns_status answer(const rcgns_file *file, const rc_zone *zone, const sl
           rc_fail(message, RCGNS_GEOMETRY,
                   "%s: zone %s: more than two cells, %lld and %lld among them, have face %lld: repair the mesh", file->path,
                   zone->name, (long long)first[f] + 1, (long long)asked[i].cell + 1, (long long)number_of(zone, asked[i].face));
-    else if (!rc_push(length, n) || !rc_reserve(node, n, sizeof(int64_t)))
+    else if (!ra_push_int(length, n) || !ra_reserve(node, n, sizeof(int64_t)))
       status = rc_no_memory(message);
     for (int64_t v = 0; v < n && status == RCGNS_OK; v++) {
       const int64_t mine = ints_of(&s->node)[at + v];
@@ -276,11 +277,11 @@ static void make_requests(const rcgns_file *file, const rc_zone *zone, const pol
 {
   const int64_t *face = p->faces.key.item, *ref = p->ref.item, *offset = p->offset.item;
 
-  for (int64_t f = 0; f < p->faces.key.count; f++) count[rc_owner(zone->num_faces, face[f], file->size)]++;
+  for (int64_t f = 0; f < p->faces.key.count; f++) count[ra_owner(zone->num_faces, face[f], file->size)]++;
   next[0] = 0;
   for (int r = 1; r < file->size; r++) next[r] = next[r - 1] + count[r - 1];
   for (int64_t f = 0; f < p->faces.key.count; f++) {
-    place[f]       = next[rc_owner(zone->num_faces, face[f], file->size)]++;
+    place[f]       = next[ra_owner(zone->num_faces, face[f], file->size)]++;
     send[place[f]] = (request){face[f], (ref[2 * f] >= 0) + (ref[2 * f + 1] >= 0), -1};
   }
   for (int64_t c = 0; c < p->num_cells; c++)
@@ -300,11 +301,11 @@ static void sum_runs(int size, const int64_t *recv, const int64_t *length, int64
 static rcgns_status fetch_loops(rcgns_file *file, const rc_zone *zone, polys *p, rcgns_message *message)
 {
   const int64_t num   = p->faces.key.count;
-  slab          s     = {.lo = rc_share(zone->num_faces, file->rank, file->size),
-                         .hi = rc_share(zone->num_faces, file->rank + 1, file->size)};
-  int64_t      *count = calloc(5 * (size_t)file->size, sizeof *count), *place = rc_alloc(num, sizeof *place), *start = NULL;
-  request      *send   = rc_alloc(num, sizeof *send);
-  rc_array      length = {.item = NULL}, node = {.item = NULL};
+  slab          s     = {.lo = ra_share(zone->num_faces, file->rank, file->size),
+                         .hi = ra_share(zone->num_faces, file->rank + 1, file->size)};
+  int64_t      *count = calloc(5 * (size_t)file->size, sizeof *count), *place = ra_alloc(num, sizeof *place), *start = NULL;
+  request      *send   = ra_alloc(num, sizeof *send);
+  ra_array      length = {.item = NULL}, node = {.item = NULL};
   void         *asked = NULL, *lengths = NULL, *nodes = NULL;
   int64_t      *recv = NULL, *out = NULL, *in = NULL, num_asked = 0, at = 0;
   rcgns_status  status = count && place && send ? RCGNS_OK : rc_no_memory(message);
@@ -322,8 +323,8 @@ static rcgns_status fetch_loops(rcgns_file *file, const rc_zone *zone, polys *p,
   RC_GOTO(done, status = rc_exchange(file->comm, status, length.item, recv, sizeof(int64_t), &lengths, count, message));
   sum_runs(file->size, recv, length.item, out);
   RC_GOTO(done, status = rc_exchange(file->comm, RCGNS_OK, node.item, out, sizeof(int64_t), &nodes, in, message));
-  start = rc_alloc(num + 1, sizeof *start);
-  if (!start || !rc_push(&p->loop_at, 0)) status = rc_no_memory(message);
+  start = ra_alloc(num + 1, sizeof *start);
+  if (!start || !ra_push_int(&p->loop_at, 0)) status = rc_no_memory(message);
   for (int64_t i = 0; i < num && status == RCGNS_OK; i++) {
     start[i] = at;
     at += ((const int64_t *)lengths)[i];
@@ -331,21 +332,21 @@ static rcgns_status fetch_loops(rcgns_file *file, const rc_zone *zone, polys *p,
   for (int64_t f = 0; f < num && status == RCGNS_OK; f++) {
     const int64_t n = ((const int64_t *)lengths)[place[f]];
 
-    if (!rc_reserve(&p->loop, n, sizeof(int64_t))) {
+    if (!ra_reserve(&p->loop, n, sizeof(int64_t))) {
       status = rc_no_memory(message);
       break;
     }
     if (n) memcpy(ints_of(&p->loop) + p->loop.count, (const int64_t *)nodes + start[place[f]], (size_t)n * sizeof(int64_t));
     p->loop.count += n;
-    if (!rc_push(&p->loop_at, p->loop.count)) status = rc_no_memory(message);
+    if (!ra_push_int(&p->loop_at, p->loop.count)) status = rc_no_memory(message);
   }
   status = rc_agree(file->comm, status, message);
 done:
-  rc_drop(&s.at);
-  rc_drop(&s.end);
-  rc_drop(&s.node);
-  rc_drop(&length);
-  rc_drop(&node);
+  ra_drop(&s.at);
+  ra_drop(&s.end);
+  ra_drop(&s.node);
+  ra_drop(&length);
+  ra_drop(&node);
   free(count);
   free(place);
   free(start);
@@ -359,20 +360,20 @@ done:
 /* Turn the nodes of the loops into nodes of this rank's mesh. Collective. */
 static rcgns_status locate(rcgns_file *file, const rc_zone *zone, polys *p, rcgns_message *message)
 {
-  rc_array    *xyz    = &file->build.xyz;
+  ra_array    *xyz    = &file->build.xyz;
   int64_t     *loop   = p->loop.item;
-  rc_map      *nodes  = &p->nodes;
+  ra_map      *nodes  = &p->nodes;
   rcgns_status status = RCGNS_OK;
 
   nodes->width  = 1;
   p->first_node = xyz->count;
   for (int64_t i = 0; i < p->loop.count && status == RCGNS_OK; i++) {
-    const int64_t local = rc_map_add(nodes, &loop[i]);
+    const int64_t local = ra_map_add(nodes, &loop[i]);
 
     if (local < 0) status = rc_no_memory(message);
     loop[i] = xyz->count + local;
   }
-  if (status == RCGNS_OK && !rc_reserve(xyz, nodes->key.count, 3 * sizeof(double))) status = rc_no_memory(message);
+  if (status == RCGNS_OK && !ra_reserve(xyz, nodes->key.count, 3 * sizeof(double))) status = rc_no_memory(message);
   for (int64_t i = 0; i < nodes->key.count && status == RCGNS_OK; i++)
     if (!rc_number_node(file, zone, ((const int64_t *)nodes->key.item)[i])) status = rc_no_memory(message);
   status =
@@ -399,14 +400,14 @@ static int by_nodes(const void *a, const void *b)
 }
 
 /* The edges of cell c, sorted by their nodes. */
-static bool edges_of(const polys *p, int64_t c, rc_array *edges)
+static bool edges_of(const polys *p, int64_t c, ra_array *edges)
 {
   edges->count = 0;
   for (int64_t i = ints_of(&p->offset)[c]; i < ints_of(&p->offset)[c + 1]; i++) {
     const int64_t  f = ints_of(&p->face)[i], n = ints_of(&p->loop_at)[f + 1] - ints_of(&p->loop_at)[f];
     const int64_t *loop = ints_of(&p->loop) + ints_of(&p->loop_at)[f];
 
-    if (!rc_reserve(edges, n, sizeof(edge))) return false;
+    if (!ra_reserve(edges, n, sizeof(edge))) return false;
     for (int64_t v = 0; v < n && ints_of(&p->sign)[i]; v++) {
       const int64_t a = loop[v], b = loop[v + 1 < n ? v + 1 : 0];
 
@@ -418,7 +419,7 @@ static bool edges_of(const polys *p, int64_t c, rc_array *edges)
 }
 
 /* One past the last edge with the nodes of edge i. */
-static int64_t run_of(const rc_array *edges, int64_t i)
+static int64_t run_of(const ra_array *edges, int64_t i)
 {
   const edge *e = edges->item;
   int64_t     k = i + 1;
@@ -428,7 +429,7 @@ static int64_t run_of(const rc_array *edges, int64_t i)
 }
 
 /* Is every edge run as often one way as the other? */
-static bool is_closed(const rc_array *edges, const int64_t *sign)
+static bool is_closed(const ra_array *edges, const int64_t *sign)
 {
   const edge *e = edges->item;
 
@@ -466,7 +467,7 @@ static int64_t root_of(forest *t, int64_t i, int64_t *same)
 }
 
 /* Signs for the faces of cell c that agree along every edge between two of them; false: they do not hang together. */
-static bool spread_signs(const polys *p, int64_t c, const rc_array *edges, forest *t, int64_t *trial)
+static bool spread_signs(const polys *p, int64_t c, const ra_array *edges, forest *t, int64_t *trial)
 {
   const int64_t begin = ints_of(&p->offset)[c], end = ints_of(&p->offset)[c + 1];
   const edge   *e    = edges->item;
@@ -508,9 +509,9 @@ static double volume_of(const rcgns_file *file, const polys *p, int64_t c, const
  * remap_build, which knows coordinates. */
 static rcgns_status repair_signs(const rcgns_file *file, polys *p, bool *repaired, rcgns_message *message)
 {
-  int64_t     *sign = p->sign.item, *space = rc_alloc(3 * p->sign.count, sizeof *space), *trial = space;
+  int64_t     *sign = p->sign.item, *space = ra_alloc(3 * p->sign.count, sizeof *space), *trial = space;
   forest       tree   = {space + p->sign.count, space + 2 * p->sign.count};
-  rc_array     edges  = {.item = NULL};
+  ra_array     edges  = {.item = NULL};
   rcgns_status status = space ? RCGNS_OK : rc_no_memory(message);
 
   for (int64_t c = 0; c < p->num_cells && status == RCGNS_OK; c++) {
@@ -524,7 +525,7 @@ static rcgns_status repair_signs(const rcgns_file *file, polys *p, bool *repaire
     for (int64_t i = begin; i < end; i++) sign[i] = volume < 0.0 ? -trial[i] : trial[i];
     *repaired = true;
   }
-  rc_drop(&edges);
+  ra_drop(&edges);
   free(space);
   return status;
 }
@@ -567,7 +568,7 @@ static bool add_rim(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t 
   const int64_t  begin = mesh->rim_node.count;
 
   for (int64_t k = ints_of(&p->loop_at)[f]; k < ints_of(&p->loop_at)[f + 1]; k++)
-    if (!rc_push(&mesh->rim_node, node[ints_of(&p->loop)[k] - p->first_node])) return false;
+    if (!ra_push_int(&mesh->rim_node, node[ints_of(&p->loop)[k] - p->first_node])) return false;
   return rc_rim_add(mesh, zone, number_of(zone, ints_of(&p->faces.key)[f]), -1, begin, mesh->rim_node.count);
 }
 

@@ -176,8 +176,8 @@ static void hand_on(const rcgns_file *file, const rc_section *section, const gue
 static rcgns_status find_entries(rcgns_file *file, const rc_section *section, int64_t *block, place *entry, place *after,
                                  rcgns_message *message)
 {
-  const int64_t lo      = rc_share(section->length, file->rank, file->size);
-  const int64_t hi      = rc_share(section->length, file->rank + 1, file->size);
+  const int64_t lo      = ra_share(section->length, file->rank, file->size);
+  const int64_t hi      = ra_share(section->length, file->rank + 1, file->size);
   const bool    is_last = file->rank == file->size - 1;
   guess         g;
   int           stuck = -1;
@@ -216,7 +216,7 @@ static bool scan_block(scan *s, const int64_t *data, int64_t lo, int64_t hi)
 
     if (n < 1 || n >= s->end.at - s->next.at) return false;
     if (s->next.row % RC_CUT == 0) {
-      s->has_memory = s->has_memory && rc_reserve(&section->cut, 1, sizeof(rc_cut));
+      s->has_memory = s->has_memory && ra_reserve(&section->cut, 1, sizeof(rc_cut));
       if (!s->has_memory) return false;
       ((rc_cut *)section->cut.item)[section->cut.count++] = (rc_cut){s->next.row, s->next.at, s->cells};
     }
@@ -234,8 +234,8 @@ static rcgns_status begin_by_offsets(rcgns_file *file, scan *s, rcgns_message *m
   const int64_t     cuts    = (section->num_rows + RC_CUT - 1) / RC_CUT;
   bool              any;
 
-  s->next.row = rc_clamp(rc_share(cuts, file->rank, file->size) * RC_CUT, 0, section->num_rows);
-  s->end.row  = rc_clamp(rc_share(cuts, file->rank + 1, file->size) * RC_CUT, 0, section->num_rows);
+  s->next.row = rc_clamp(ra_share(cuts, file->rank, file->size) * RC_CUT, 0, section->num_rows);
+  s->end.row  = rc_clamp(ra_share(cuts, file->rank + 1, file->size) * RC_CUT, 0, section->num_rows);
   any         = s->next.row < s->end.row;
   RC_TRY(rc_read_1d(file, RCGNS_OK, section->offsets, s->next.row, s->next.row + any, 'I', &s->next.at, message));
   RC_TRY(rc_read_1d(file, RCGNS_OK, section->offsets, s->end.row, s->end.row + any, 'I', &s->end.at, message));
@@ -271,7 +271,7 @@ static rcgns_status scan_all(rcgns_file *file, const rc_zone *zone, scan *s, int
 rcgns_status rc_rows_scan(rcgns_file *file, const rc_zone *zone, rc_section *section, bool *curved, rcgns_message *message)
 {
   scan         s      = {.file = file, .section = section, .has_memory = true};
-  int64_t     *block  = rc_alloc(BLOCK, sizeof *block), before = 0, sum[2];
+  int64_t     *block  = ra_alloc(BLOCK, sizeof *block), before = 0, sum[2];
   rcgns_status status = block ? RCGNS_OK : rc_no_memory(message);
 
   RC_GOTO(done, status = rc_agree(file->comm, status, message));
@@ -328,7 +328,7 @@ rcgns_status rc_cuts_find(rcgns_file *file, rcgns_status mine, const rc_section 
   }
   RC_GOTO(done, status = rc_exchange(file->comm, RCGNS_OK, key, ask, sizeof *key, &keys, asked, message));
   for (int r = 0; r < file->size; r++) total += asked[r];
-  if (!(answer = rc_alloc(total, sizeof *answer))) status = rc_no_memory(message);
+  if (!(answer = ra_alloc(total, sizeof *answer))) status = rc_no_memory(message);
   for (int64_t i = 0; i < total && answer; i++) answer[i] = last_cut(section, by_cell, ((const int64_t *)keys)[i]);
   RC_GOTO(done, status = rc_exchange(file->comm, status, answer, asked, sizeof *answer, &back, ask, message));
   if (num) memcpy(found, back, (size_t)num * sizeof *found);
@@ -372,7 +372,7 @@ static rcgns_status span_by_cuts(rcgns_file *file, rcgns_status mine, const rc_s
 }
 
 /* Of the rows from the cut below lo on, which the scan found sound, keep [lo, hi); at [hi - lo + 1]. */
-static void keep_rows(const rcgns_file *file, const rc_section *section, int64_t lo, int64_t hi, int64_t *at, rc_array *data)
+static void keep_rows(const rcgns_file *file, const rc_section *section, int64_t lo, int64_t hi, int64_t *at, ra_array *data)
 {
   const int64_t skip = section->layout == RC_MIXED ? 0 : 1;
   int64_t      *in = data->item, kept = 0, p = 0;
@@ -393,7 +393,7 @@ static void keep_rows(const rcgns_file *file, const rc_section *section, int64_t
 }
 
 rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_section *section, int64_t lo, int64_t hi,
-                          rc_array *offset, rc_array *data, rcgns_message *message)
+                          ra_array *offset, ra_array *data, rcgns_message *message)
 {
   const int64_t n       = hi - lo;
   const bool    indexed = section->layout == RC_OFFSETS;
@@ -401,11 +401,11 @@ rcgns_status rc_rows_read(rcgns_file *file, const rc_zone *zone, const rc_sectio
   rcgns_status  status  = RCGNS_OK;
 
   offset->count = data->count = 0;
-  if (!rc_reserve(offset, n + 1, sizeof(int64_t))) status = rc_no_memory(message);
+  if (!ra_reserve(offset, n + 1, sizeof(int64_t))) status = rc_no_memory(message);
   at     = offset->item;
   status = indexed ? span_by_offsets(file, status, zone, section, lo, hi, at, span, message)
                    : span_by_cuts(file, status, section, lo, hi, span, message);
-  if (status == RCGNS_OK && !rc_reserve(data, span[1] - span[0], sizeof(int64_t))) status = rc_no_memory(message);
+  if (status == RCGNS_OK && !ra_reserve(data, span[1] - span[0], sizeof(int64_t))) status = rc_no_memory(message);
   RC_TRY(rc_read_1d(file, status, section->connectivity, span[0], span[1], 'I', data->item, message));
   offset->count = n + 1;
   if (!indexed) {

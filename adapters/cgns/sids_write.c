@@ -17,7 +17,7 @@
 
 static int64_t add_entry(rc_plan *plan, const rc_entry *entry)
 {
-  if (!rc_reserve(&plan->entry, 1, sizeof *entry)) return -1;
+  if (!ra_reserve(&plan->entry, 1, sizeof *entry)) return -1;
   *rc_entry_at(plan, plan->entry.count) = *entry;
   return plan->entry.count++;
 }
@@ -42,7 +42,7 @@ void rc_plan_drop(rc_plan *plan)
     free(rc_entry_at(plan, i)->link_file);
     free(rc_entry_at(plan, i)->link_path);
   }
-  rc_drop(&plan->entry);
+  ra_drop(&plan->entry);
 }
 
 /* What is put into which zones. */
@@ -310,7 +310,7 @@ static rcgns_status make_plan(change *c)
   rcgns_status   status = check_names(c);
 
   if (status != RCGNS_OK) return status;
-  c->zone_of = rc_alloc(tree->node.count, sizeof *c->zone_of);
+  c->zone_of = ra_alloc(tree->node.count, sizeof *c->zone_of);
   c->touched = calloc((size_t)tree->node.count, sizeof *c->touched);
   if (!c->zone_of || !c->touched) status = rc_no_memory(c->message);
   for (int64_t i = 0; i < tree->node.count && status == RCGNS_OK; i++) c->zone_of[i] = -1;

@@ -216,9 +216,9 @@ static rcgns_status count_parents(rcgns_file *file, rc_zone *zone, rcgns_message
     const rc_section *s   = zone->face + i;
     const rc_node    *n   = rc_node_at(&file->tree, s->parents);
     const rc_box      box = rc_whole(n);
-    const int64_t     lo  = rc_share(2 * s->num_rows, file->rank, file->size),
-                  hi      = rc_share(2 * s->num_rows, file->rank + 1, file->size);
-    int64_t *parent       = rc_alloc(hi - lo, sizeof *parent);
+    const int64_t     lo  = ra_share(2 * s->num_rows, file->rank, file->size),
+                  hi      = ra_share(2 * s->num_rows, file->rank + 1, file->size);
+    int64_t *parent       = ra_alloc(hi - lo, sizeof *parent);
 
     if (n->nd != 2 || n->dim[0] < 2 || n->dim[1] != s->num_rows)
       status = rc_fail(message, RCGNS_IO, "%s: zone %s: ParentElements does not match its section", file->path, zone->name);
@@ -344,8 +344,8 @@ static rcgns_status read_zone(rcgns_file *file, rc_zone *zone, bool *keep, rcgns
 
 static void drop_zone(rc_zone *zone)
 {
-  for (int64_t i = 0; i < zone->num_sections; i++) rc_drop(&zone->section[i].cut);
-  for (int64_t i = 0; i < zone->num_face_sections; i++) rc_drop(&zone->face[i].cut);
+  for (int64_t i = 0; i < zone->num_sections; i++) ra_drop(&zone->section[i].cut);
+  for (int64_t i = 0; i < zone->num_face_sections; i++) ra_drop(&zone->face[i].cut);
   free(zone->section);
   free(zone->face);
 }
@@ -372,7 +372,7 @@ static rcgns_status note_dead(rcgns_file *file, int64_t base, rcgns_message *mes
 }
 
 /* All zones of one base. Collective. */
-static rcgns_status read_base(rcgns_file *file, int64_t base, rc_array *zones, rcgns_message *message)
+static rcgns_status read_base(rcgns_file *file, int64_t base, ra_array *zones, rcgns_message *message)
 {
   RC_TRY(rc_agree(file->comm, note_dead(file, base, message), message));
   for (int64_t at = -1; (at = rc_tree_find(&file->tree, base, at, "Zone_t", NULL)) >= 0;) {
@@ -381,7 +381,7 @@ static rcgns_status read_base(rcgns_file *file, int64_t base, rc_array *zones, r
     rcgns_status status;
 
     zone.name = rc_keep(file, "%s/%s", rc_node_at(&file->tree, base)->name, rc_node_at(&file->tree, at)->name);
-    status    = zone.name && rc_reserve(zones, 1, sizeof zone) ? RCGNS_OK : rc_no_memory(message);
+    status    = zone.name && ra_reserve(zones, 1, sizeof zone) ? RCGNS_OK : rc_no_memory(message);
     status    = rc_agree(file->comm, status, message);
     if (status == RCGNS_OK) status = read_zone(file, &zone, &keep, message);
     if (status != RCGNS_OK || !keep) {
@@ -403,7 +403,7 @@ static rcgns_status read_base(rcgns_file *file, int64_t base, rc_array *zones, r
 
 rcgns_status rc_zones_find(rcgns_file *file, const char *base, rcgns_message *message)
 {
-  rc_array     zones     = {.item = NULL};
+  ra_array     zones     = {.item = NULL};
   rcgns_status status    = RCGNS_OK;
   int64_t      bases     = 0;
   char         list[512] = "";

@@ -44,7 +44,7 @@ int64_t rc_tree_store(rc_tree *tree, const void *bytes, int64_t count)
   static const char zero[8] = {0};
   const int64_t     at      = (tree->pool.count + 7) / 8 * 8;
 
-  if (!rc_reserve(&tree->pool, at - tree->pool.count + count, 1)) return -1;
+  if (!ra_reserve(&tree->pool, at - tree->pool.count + count, 1)) return -1;
   memcpy((char *)tree->pool.item + tree->pool.count, zero, (size_t)(at - tree->pool.count));
   memcpy((char *)tree->pool.item + at, bytes, (size_t)count);
   tree->pool.count = at + count;
@@ -56,7 +56,7 @@ int64_t rc_tree_add(rc_tree *tree, int64_t parent, const rc_node *node)
   const int64_t at = tree->node.count;
   rc_node      *mine;
 
-  if (!rc_reserve(&tree->node, 1, sizeof *node)) return -1;
+  if (!ra_reserve(&tree->node, 1, sizeof *node)) return -1;
   mine         = rc_node_at(tree, at);
   *mine        = *node;
   mine->parent = parent;
@@ -84,7 +84,7 @@ int rc_tree_source(rc_tree *tree, const char *path, bool is_adf)
   source.device = (int64_t)st.st_dev;
   source.inode  = (int64_t)st.st_ino;
   source.path   = rc_tree_store(tree, path, (int64_t)strlen(path) + 1);
-  if (source.path < 0 || !rc_reserve(&tree->source, 1, sizeof source)) return -1;
+  if (source.path < 0 || !ra_reserve(&tree->source, 1, sizeof source)) return -1;
   *rc_source_at(tree, tree->source.count) = source;
   return (int)tree->source.count++;
 }
@@ -149,8 +149,8 @@ rcgns_status rc_tree_bcast(MPI_Comm comm, rc_tree *tree, rcgns_message *message)
 
   MPI_Comm_rank(comm, &rank);
   rc_bcast(comm, count, (int64_t)sizeof count);
-  if (rank && !(rc_reserve(&tree->node, count[0], sizeof(rc_node)) && rc_reserve(&tree->source, count[1], sizeof(rc_source)) &&
-                rc_reserve(&tree->pool, count[2], 1)))
+  if (rank && !(ra_reserve(&tree->node, count[0], sizeof(rc_node)) && ra_reserve(&tree->source, count[1], sizeof(rc_source)) &&
+                ra_reserve(&tree->pool, count[2], 1)))
     status = rc_no_memory(message);
   RC_TRY(rc_agree(comm, status, message));
   tree->node.count   = count[0];
@@ -164,9 +164,9 @@ rcgns_status rc_tree_bcast(MPI_Comm comm, rc_tree *tree, rcgns_message *message)
 
 void rc_tree_drop(rc_tree *tree)
 {
-  rc_drop(&tree->node);
-  rc_drop(&tree->source);
-  rc_drop(&tree->pool);
+  ra_drop(&tree->node);
+  ra_drop(&tree->source);
+  ra_drop(&tree->pool);
 }
 
 /* ---- boxes -------------------------------------------------------------------------------------------------------- */

@@ -1,6 +1,7 @@
 /* command -- what the commands share; see command.h. */
 #include "command.h"
 
+#include <base.h>
 #include <getopt.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -58,14 +59,7 @@ cli_exit cli_from_cgns(rcgns_status status, const rcgns_message *message, cli_fa
 
 cli_exit cli_agree_on(MPI_Comm comm, cli_exit mine, cli_failure *why)
 {
-  struct {
-    int code, rank;
-  } worst = {(int)mine, 0};
-
-  MPI_Comm_rank(comm, &worst.rank);
-  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_2INT, MPI_MAXLOC, comm);
-  if (worst.code != CLI_DONE) MPI_Bcast(why->text, (int)sizeof why->text, MPI_CHAR, worst.rank, comm);
-  return (cli_exit)worst.code;
+  return (cli_exit)ra_agree(comm, (int)mine, why->text, sizeof why->text);
 }
 
 double cli_slowest(MPI_Comm comm, double since)

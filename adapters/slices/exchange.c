@@ -4,6 +4,8 @@
  * Siebert and Lumsdaine, 2010). Linear in what is sent and received, with a look at every rank. */
 #include "slices.h"
 
+#include "base.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,8 +18,6 @@ rslice_status rslice_agree(MPI_Comm comm, rslice_status mine)
   MPI_Allreduce(MPI_IN_PLACE, &status, 1, MPI_INT, MPI_MAX, comm);
   return (rslice_status)status;
 }
-
-void *rslice_room(int64_t count, size_t size) { return count < 0 ? NULL : calloc((size_t)count + 1, size); }
 
 /* Send a message and receive another, which may be of another length. */
 static void swap(MPI_Comm comm, int64_t chunk, const char *out, int64_t out_bytes, int to, char *in, int64_t in_bytes, int from)
@@ -90,15 +90,15 @@ rslice_status rslice_exchange(MPI_Comm comm, rslice_status mine, int64_t chunk, 
 
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
-  to      = rslice_room(2 * ((int64_t)ranks + 1), sizeof *to);
-  request = rslice_room(ranks, sizeof *request);
+  to      = ra_zeros(2 * ((int64_t)ranks + 1), sizeof *to);
+  request = ra_zeros(ranks, sizeof *request);
   from    = to ? to + ranks + 1 : NULL;
   mine    = rslice_agree(comm, mine == RSLICE_OK && !(to && request) ? RSLICE_MEMORY : mine);
   if (mine == RSLICE_OK) {
     tell_counts(comm, rank, ranks, send_count, recv_count, request);
     add_up(ranks, send_count, to);
     add_up(ranks, recv_count, from);
-    in   = rslice_room(from[ranks], size);
+    in   = ra_zeros(from[ranks], size);
     mine = rslice_agree(comm, in ? RSLICE_OK : RSLICE_MEMORY);
   }
   if (mine == RSLICE_OK) {

@@ -1,6 +1,8 @@
 /* ship -- rows to the ranks that write them: two exchanges, one of numbers and lengths, one of words. Linear. */
 #include "slices.h"
 
+#include "base.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,21 +15,6 @@ const char *rslice_status_text(rslice_status status)
 #undef X
   }
   return "unknown status";
-}
-
-int64_t rslice_begin(int64_t n, int rank, int size)
-{
-  const int64_t rest = n % size;
-
-  return n / size * rank + (rank < rest ? rank : rest);
-}
-
-/* The rank that writes row i. */
-static int owner_of(int64_t n, int64_t i, int size)
-{
-  const int64_t each = n / size, rest = n % size;
-
-  return (int)(i < rest * (each + 1) ? i / (each + 1) : rest + (i - rest * (each + 1)) / each);
 }
 
 /* What goes out, sorted by rank: {number, length} of each row, and the words. */
@@ -49,15 +36,15 @@ static rslice_status pack(int size, int64_t total, int64_t num, const int64_t *g
 {
   const int64_t base = num ? offset[0] : 0;
 
-  p->head      = rslice_room(2 * num, sizeof *p->head);
-  p->word      = rslice_room(num ? offset[num] - base : 0, sizeof *p->word);
-  p->num_heads = rslice_room(4 * (int64_t)size, sizeof *p->num_heads);
+  p->head      = ra_zeros(2 * num, sizeof *p->head);
+  p->word      = ra_zeros(num ? offset[num] - base : 0, sizeof *p->word);
+  p->num_heads = ra_zeros(4 * (int64_t)size, sizeof *p->num_heads);
   if (!p->head || !p->word || !p->num_heads) return RSLICE_MEMORY;
   p->num_words = p->num_heads + size;
   p->next_head = p->num_heads + 2 * size;
   p->next_word = p->num_heads + 3 * size;
   for (int64_t i = 0; i < num; i++) {
-    const int r = owner_of(total, global[i], size);
+    const int r = ra_owner(total, global[i], size);
 
     p->num_heads[r] += 2;
     p->num_words[r] += offset[i + 1] - offset[i];
@@ -67,7 +54,7 @@ static rslice_status pack(int size, int64_t total, int64_t num, const int64_t *g
     p->next_word[r] = p->next_word[r - 1] + p->num_words[r - 1];
   }
   for (int64_t i = 0; i < num; i++) {
-    const int     r = owner_of(total, global[i], size);
+    const int     r = ra_owner(total, global[i], size);
     const int64_t n = offset[i + 1] - offset[i];
 
     p->head[p->next_head[r]++] = global[i];
@@ -81,9 +68,9 @@ static rslice_status pack(int size, int64_t total, int64_t num, const int64_t *g
 /* What came, in the order of the rows. */
 static rslice_status unpack(const int64_t *head, int64_t num, const int64_t *word, rslice_rows *out)
 {
-  int64_t *from = rslice_room(out->num, sizeof *from), at = 0;
+  int64_t *from = ra_zeros(out->num, sizeof *from), at = 0;
 
-  out->offset = rslice_room(out->num + 1, sizeof *out->offset);
+  out->offset = ra_zeros(out->num + 1, sizeof *out->offset);
   if (!from || !out->offset) {
     free(from);
     return RSLICE_MEMORY;
@@ -102,7 +89,7 @@ static rslice_status unpack(const int64_t *head, int64_t num, const int64_t *wor
     free(from);
     return RSLICE_INTERNAL;
   }
-  out->word = rslice_room(out->offset[out->num], sizeof *out->word);
+  out->word = ra_zeros(out->offset[out->num], sizeof *out->word);
   for (int64_t i = 0; out->word && i < out->num; i++)
     memcpy(out->word + out->offset[i], word + from[i], (size_t)(out->offset[i + 1] - out->offset[i]) * sizeof *word);
   free(from);
@@ -120,10 +107,10 @@ rslice_status rslice_ship_chunked(MPI_Comm comm, rslice_status mine, int64_t chu
 
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &size);
-  *out     = (rslice_rows){.first = rslice_begin(total, rank, size)};
-  out->num = rslice_begin(total, rank + 1, size) - out->first;
+  *out     = (rslice_rows){.first = ra_share(total, rank, size)};
+  out->num = ra_share(total, rank + 1, size) - out->first;
   if (status == RSLICE_OK) status = pack(size, total, num, global, offset, word, &p);
-  if (status == RSLICE_OK && !(recv_count = rslice_room(size, sizeof *recv_count))) status = RSLICE_MEMORY;
+  if (status == RSLICE_OK && !(recv_count = ra_zeros(size, sizeof *recv_count))) status = RSLICE_MEMORY;
   status = rslice_exchange(comm, status, chunk, sizeof *p.head, p.num_heads, p.head, recv_count, &heads);
   for (int r = 0; r < size && status == RSLICE_OK; r++) num_in += recv_count[r] / 2;
   status = rslice_exchange(comm, status, chunk, sizeof *p.word, p.num_words, p.word, recv_count, &words);

@@ -2,8 +2,8 @@
  * slices.h -- what the writers of supermeshes share: rows of global arrays brought to the ranks that write them, and
  * files that appear when they are complete.
  *
- * A global array of n rows is written in slices: rank r has the rows from rslice_begin(n, r, size) up to that of rank r + 1.
- * The rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that is
+ * A global array of n rows is written in slices: rank r has the rows from ra_share(n, r, size) (base.h) up to that of rank
+ * r + 1. The rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that is
  * written in their order, whatever the number of ranks. No rank ever holds more than its slices and its own part. */
 #ifndef REMAP_ADAPTERS_SLICES_H
 #define REMAP_ADAPTERS_SLICES_H
@@ -35,9 +35,6 @@ const char *rslice_status_text(rslice_status status);
 
 /** The greatest status of all ranks. Collective on comm. */
 rslice_status rslice_agree(MPI_Comm comm, rslice_status mine);
-
-/** calloc, never NULL for 0 items; NULL: no memory, or a count below 0. Not collective. */
-void *rslice_room(int64_t count, size_t size);
 
 /** Bytes of one message at most: MPI counts in int. */
 #define RSLICE_CHUNK ((int64_t)1 << 30)
@@ -74,9 +71,6 @@ typedef struct rslice_rows {
   int64_t *offset;     /**< [num + 1] from 0, in words */
   int64_t *word;       /**< [offset[num]] */
 } rslice_rows;
-
-/** First of n rows that a rank writes; rank == size gives n. Slices differ by one row at most. Not collective. */
-int64_t rslice_begin(int64_t n, int rank, int size);
 
 /** Bring rows to their slices. global [num] are the numbers of the rows that this rank has, word[offset[i] .. offset[i + 1])
  *  row i. A row may come from several ranks: they give the same words. mine is the caller's own status so far, so that a rank

@@ -43,7 +43,7 @@ static int64_t face_of(const rsurf_surface *s, int64_t side)
 /* Is there an edge between two nodes? */
 static bool has_edge(const rs_edges *e, int64_t a, int64_t b)
 {
-  return rs_map_find(&e->map, (uint64_t[2]){(uint64_t)(a < b ? a : b), (uint64_t)(a < b ? b : a)}) >= 0;
+  return ra_map_find(&e->map, (int64_t[2]){a < b ? a : b, a < b ? b : a}) >= 0;
 }
 
 /* Flip the longest side of cap f, whose middle corner is v, if the face behind it is a triangle that nobody has changed. */
@@ -72,7 +72,7 @@ static bool flip(rsurf_surface *s, const rs_edges *e, int64_t f, int v, uint8_t 
 
 rsurf_status rs_flip_caps(rsurf_surface *s, const double *xyz, rsurf_repairs *repairs, rsurf_message *message)
 {
-  uint8_t     *changed = rs_alloc(s->num_faces, 1);
+  uint8_t     *changed = ra_zeros(s->num_faces, 1);
   int64_t      flipped = 1;
   rsurf_status status  = changed ? RSURF_OK : rs_no_memory(message);
 

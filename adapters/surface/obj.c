@@ -12,8 +12,8 @@ enum { MOST_CORNERS = 1 << 20 };
 typedef struct obj {
   rs_input *in;
   int64_t   line;
-  rs_array  vertex; /* int64_t: node of each v */
-  rs_array  loop;   /* int64_t: of the face that is read */
+  ra_array  vertex; /* int64_t: node of each v */
+  ra_array  loop;   /* int64_t: of the face that is read */
 } obj;
 
 /* Blanks of this line, which ends at a NUL. */
@@ -45,7 +45,7 @@ static rsurf_status read_vertex(obj *o, const char *at)
     at = end;
   }
   RS_TRY(rs_node(o->in, xyz, "line", o->line, &node));
-  return rs_push(&o->vertex, &node, sizeof node) ? RSURF_OK : rs_no_memory(o->in->message);
+  return ra_push(&o->vertex, &node, sizeof node) ? RSURF_OK : rs_no_memory(o->in->message);
 }
 
 /* The corner of a face: i, i/t, i//n or i/t/n; i counts from 1, or backwards from the last vertex. */
@@ -69,7 +69,7 @@ static rsurf_status read_corner(obj *o, const char **at)
   if (o->loop.count == MOST_CORNERS)
     return rs_fail(o->in->message, RSURF_IO, "%s: line %lld: a face has more than %d corners: repair the file", o->in->path,
                    (long long)o->line, MOST_CORNERS);
-  return rs_push(&o->loop, (const int64_t *)o->vertex.item + (i > 0 ? i - 1 : num + i), sizeof i)
+  return ra_push(&o->loop, (const int64_t *)o->vertex.item + (i > 0 ? i - 1 : num + i), sizeof i)
              ? RSURF_OK
              : rs_no_memory(o->in->message);
 }

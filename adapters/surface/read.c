@@ -48,8 +48,8 @@ static rsurf_status load(rs_input *in)
 
 rsurf_status rs_node(rs_input *in, const double xyz[3], const char *unit, int64_t where, int64_t *node)
 {
-  double   at[3];
-  uint64_t key[3];
+  double  at[3];
+  int64_t key[3];
 
   for (int k = 0; k < 3; k++) {
     at[k] = xyz[k] * in->scale + 0.0; /* one zero, not two */
@@ -58,7 +58,7 @@ rsurf_status rs_node(rs_input *in, const double xyz[3], const char *unit, int64_
                      (long long)where);
   }
   memcpy(key, at, sizeof key);
-  *node = rs_map_add(&in->nodes, key);
+  *node = ra_map_add(&in->nodes, key);
   return *node < 0 ? rs_no_memory(in->message) : RSURF_OK;
 }
 
@@ -81,7 +81,7 @@ rsurf_status rs_group(rs_input *in, const char *name, size_t length)
   if (in->names.count == 100000)
     return rs_fail(in->message, RSURF_IO, "%s: it has more than 100000 groups: join some", in->path);
   copy = strndup(name, length);
-  if (copy && rs_push(&in->names, &copy, sizeof copy)) return RSURF_OK;
+  if (copy && ra_push(&in->names, &copy, sizeof copy)) return RSURF_OK;
   free(copy);
   return rs_no_memory(in->message);
 }
@@ -91,9 +91,9 @@ rsurf_status rs_face(rs_input *in, const int64_t *node, int64_t n)
   bool ok = true;
 
   if (in->current < 0) RS_TRY(rs_group(in, "", 0));
-  for (int64_t i = 0; i < n && ok; i++) ok = rs_push(&in->loop, &node[i], sizeof *node);
-  ok = ok && rs_push(&in->offset, &in->loop.count, sizeof in->loop.count);
-  ok = ok && rs_push(&in->group, &in->current, sizeof in->current);
+  for (int64_t i = 0; i < n && ok; i++) ok = ra_push(&in->loop, &node[i], sizeof *node);
+  ok = ok && ra_push(&in->offset, &in->loop.count, sizeof in->loop.count);
+  ok = ok && ra_push(&in->group, &in->current, sizeof in->current);
   return ok ? RSURF_OK : rs_no_memory(in->message);
 }
 
@@ -119,7 +119,7 @@ static void drop_input(rs_input *in)
   free(in->offset.item);
   free(in->loop.item);
   free(in->group.item);
-  rs_map_drop(&in->nodes);
+  ra_map_drop(&in->nodes);
   free(in->text);
 }
 
@@ -131,7 +131,7 @@ rsurf_status rsurf_read(const char *path, double scale, rsurf_surface *out, rsur
 
   message->text[0] = 0;
   RS_GOTO(done, status = load(&in));
-  RS_GOTO(done, status = rs_push(&in.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message));
+  RS_GOTO(done, status = ra_push(&in.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message));
   RS_GOTO(done, status = ends_in(path, ".stl") ? rs_read_stl(&in) : rs_read_obj(&in));
   if (in.group.count)
     hand_over(&in, out);
@@ -146,21 +146,21 @@ done:
 
 struct rsurf_builder {
   rs_input in;
-  rs_array loop; /* int64_t: of the face that is added */
+  ra_array loop; /* int64_t: of the face that is added */
 };
 
 rsurf_status rsurf_begin(int32_t num_groups, const char *const *group_name, rsurf_builder **out, rsurf_message *message)
 {
-  rsurf_builder *b    = rs_alloc(1, sizeof *b);
+  rsurf_builder *b    = ra_zeros(1, sizeof *b);
   const int64_t  zero = 0;
   bool           ok   = b != NULL;
 
   if (b) b->in = (rs_input){.path = "the surface", .scale = 1, .nodes = {.width = 3}, .message = message};
-  ok = ok && rs_push(&b->in.offset, &zero, sizeof zero);
+  ok = ok && ra_push(&b->in.offset, &zero, sizeof zero);
   for (int32_t g = 0; g < num_groups && ok; g++) {
     char *copy = strdup(group_name[g]);
 
-    ok = copy && rs_push(&b->in.names, &copy, sizeof copy);
+    ok = copy && ra_push(&b->in.names, &copy, sizeof copy);
     if (!ok) free(copy);
   }
   if (!ok) {
@@ -183,7 +183,7 @@ rsurf_status rsurf_add(rsurf_builder *b, const double *xyz, int64_t n, int32_t g
     int64_t node;
 
     RS_TRY(rs_node(&b->in, xyz + 3 * i, "face", b->in.group.count + 1, &node));
-    if (!rs_push(&b->loop, &node, sizeof node)) return rs_no_memory(message);
+    if (!ra_push(&b->loop, &node, sizeof node)) return rs_no_memory(message);
   }
   return rs_face(&b->in, b->loop.item, n);
 }

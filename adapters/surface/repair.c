@@ -14,7 +14,7 @@ enum { MOST_CORNERS = 4096, MOST_NAMED = 3 };
 /* Coordinates times a power of two, so that the largest is near 1; what is below 2^-100 counts as 0. NULL: no memory. */
 static double *unit_coordinates(const rsurf_surface *s)
 {
-  double *unit    = rs_alloc(3 * s->num_nodes, sizeof *unit);
+  double *unit    = ra_zeros(3 * s->num_nodes, sizeof *unit);
   double  largest = 0;
   int     exponent;
 
@@ -100,7 +100,7 @@ static bool is_ear(const double *xyz, const int64_t *loop, int64_t n, const int6
 }
 
 /* A loop, which is used up, into triangles appended to out. false: there is no ear; *memory false: no memory. */
-static bool clip_ears(const double *xyz, int64_t *loop, int64_t n, rs_array *out, bool *memory)
+static bool clip_ears(const double *xyz, int64_t *loop, int64_t n, ra_array *out, bool *memory)
 {
   int       turn;
   const int axis = main_axis(xyz, loop, n, &turn);
@@ -112,7 +112,7 @@ static bool clip_ears(const double *xyz, int64_t *loop, int64_t n, rs_array *out
       if (++missed > n) return false;
       continue;
     }
-    for (int v = 0; v < 3 && *memory; v++) *memory = rs_push(out, &ear[v], sizeof ear[v]);
+    for (int v = 0; v < 3 && *memory; v++) *memory = ra_push(out, &ear[v], sizeof ear[v]);
     if (!*memory) return true;
     memmove(loop + at, loop + at + 1, (size_t)(n - at - 1) * sizeof *loop);
     missed = 0;
@@ -126,7 +126,7 @@ static bool clip_ears(const double *xyz, int64_t *loop, int64_t n, rs_array *out
 
 /* Faces that replace those of the surface. */
 typedef struct faces {
-  rs_array offset, loop, group;
+  ra_array offset, loop, group;
   int64_t  cut, dropped;
 } faces;
 
@@ -153,8 +153,8 @@ static bool add_face(faces *to, const int64_t *loop, int64_t n, int32_t group)
 {
   bool ok = true;
 
-  for (int64_t i = 0; i < n && ok; i++) ok = rs_push(&to->loop, &loop[i], sizeof *loop);
-  return ok && rs_push(&to->offset, &to->loop.count, sizeof to->loop.count) && rs_push(&to->group, &group, sizeof group);
+  for (int64_t i = 0; i < n && ok; i++) ok = ra_push(&to->loop, &loop[i], sizeof *loop);
+  return ok && ra_push(&to->offset, &to->loop.count, sizeof to->loop.count) && ra_push(&to->group, &group, sizeof group);
 }
 
 /* What stands in loop from `first` on are triangles. */
@@ -163,7 +163,7 @@ static bool end_triangles(faces *to, int64_t first, int32_t group)
   bool ok = true;
 
   for (int64_t end = first + 3; end <= to->loop.count && ok; end += 3)
-    ok = rs_push(&to->offset, &end, sizeof end) && rs_push(&to->group, &group, sizeof group);
+    ok = ra_push(&to->offset, &end, sizeof end) && ra_push(&to->group, &group, sizeof group);
   return ok;
 }
 
@@ -229,7 +229,7 @@ static rsurf_status clean_faces(rsurf_surface *s, const double *xyz, const char 
 {
   faces         to     = {.cut = 0};
   const int64_t zero   = 0;
-  rsurf_status  status = rs_push(&to.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message);
+  rsurf_status  status = ra_push(&to.offset, &zero, sizeof zero) ? RSURF_OK : rs_no_memory(message);
 
   for (int64_t f = 0; f < s->num_faces && status == RSURF_OK; f++) status = clean_face(s, xyz, name, f, &to, message);
   replace(s, &to, status);
@@ -245,15 +245,15 @@ static bool cut_face(const rsurf_surface *s, const double *xyz, int64_t f, faces
 {
   const int64_t  n = s->face_offset[f + 1] - s->face_offset[f], first = to->loop.count;
   const int64_t *face = s->face_node + s->face_offset[f];
-  int64_t       *loop = rs_alloc(n, sizeof *loop);
+  int64_t       *loop = ra_zeros(n, sizeof *loop);
   bool           ok   = loop != NULL;
 
   if (ok) memcpy(loop, face, (size_t)n * sizeof *loop);
   if (ok && !clip_ears(xyz, loop, n, &to->loop, &ok)) {
     to->loop.count = first;
     for (int64_t i = 1; i + 1 < n && ok; i++)
-      ok = rs_push(&to->loop, &face[0], sizeof *face) && rs_push(&to->loop, &face[i], sizeof *face) &&
-           rs_push(&to->loop, &face[i + 1], sizeof *face);
+      ok = ra_push(&to->loop, &face[0], sizeof *face) && ra_push(&to->loop, &face[i], sizeof *face) &&
+           ra_push(&to->loop, &face[i + 1], sizeof *face);
   }
   free(loop);
   return ok && end_triangles(to, first, s->face_group[f]);
@@ -264,7 +264,7 @@ rsurf_status rsurf_triangulate(rsurf_surface *s, rsurf_message *message)
   faces         to   = {.cut = 0};
   double       *xyz  = unit_coordinates(s);
   const int64_t zero = 0;
-  bool          ok   = xyz && rs_push(&to.offset, &zero, sizeof zero);
+  bool          ok   = xyz && ra_push(&to.offset, &zero, sizeof zero);
 
   for (int64_t f = 0; f < s->num_faces && ok; f++) {
     const int64_t n = s->face_offset[f + 1] - s->face_offset[f];
@@ -280,7 +280,7 @@ rsurf_status rsurf_triangulate(rsurf_surface *s, rsurf_message *message)
 
 void rs_edges_drop(rs_edges *e)
 {
-  rs_map_drop(&e->map);
+  ra_map_drop(&e->map);
   free(e->of_side);
   free(e->side);
   free(e->count);
@@ -291,14 +291,14 @@ bool rs_find_edges(const rsurf_surface *s, rs_edges *e)
   const int64_t num = s->face_offset[s->num_faces];
 
   e->map.width = 2;
-  e->of_side   = rs_alloc(num, sizeof *e->of_side);
-  e->side      = rs_alloc(num, sizeof *e->side);
-  e->count     = rs_alloc(num, sizeof *e->count);
+  e->of_side   = ra_zeros(num, sizeof *e->of_side);
+  e->side      = ra_zeros(num, sizeof *e->side);
+  e->count     = ra_zeros(num, sizeof *e->count);
   if (!e->of_side || !e->side || !e->count) return false;
   for (int64_t f = 0; f < s->num_faces; f++)
     for (int64_t i = s->face_offset[f]; i < s->face_offset[f + 1]; i++) {
       const int64_t a = s->face_node[i], b = s->face_node[i + 1 < s->face_offset[f + 1] ? i + 1 : s->face_offset[f]];
-      const int64_t edge = rs_map_add(&e->map, (uint64_t[2]){(uint64_t)(a < b ? a : b), (uint64_t)(a < b ? b : a)});
+      const int64_t edge = ra_map_add(&e->map, (int64_t[2]){a < b ? a : b, a < b ? b : a});
 
       if (edge < 0) return false;
       e->of_side[i] = edge;
@@ -316,9 +316,9 @@ static rsurf_status check_edges(const rsurf_surface *s, const rs_edges *e, const
   char    text[2][MOST_NAMED * 110] = {"", ""};
 
   for (int64_t i = 0; i < e->map.key.count; i++) {
-    const uint64_t *node = (const uint64_t *)e->map.key.item + 2 * i;
-    const int       kind = e->count[i] > 2;
-    size_t          used = strlen(text[kind]);
+    const int64_t *node = (const int64_t *)e->map.key.item + 2 * i;
+    const int      kind = e->count[i] > 2;
+    size_t         used = strlen(text[kind]);
 
     if (e->count[i] == 2) continue;
     if (num[kind]++ >= MOST_NAMED) continue;
@@ -353,7 +353,7 @@ void rs_turn_face(rsurf_surface *s, int64_t face)
 static rsurf_status spread(const rsurf_surface *s, const rs_edges *e, const char *name, int64_t *shell, int8_t *turned,
                            int64_t *num_shells, rsurf_message *message)
 {
-  int64_t *face_of = rs_alloc(s->face_offset[s->num_faces], sizeof *face_of), *stack = rs_alloc(s->num_faces, sizeof *stack);
+  int64_t *face_of = ra_zeros(s->face_offset[s->num_faces], sizeof *face_of), *stack = ra_zeros(s->num_faces, sizeof *stack);
   rsurf_status status = face_of && stack ? RSURF_OK : rs_no_memory(message);
 
   *num_shells = 0;
@@ -400,7 +400,7 @@ bool rs_fan(const rsurf_surface *s, rs_triangles *out)
 {
   const int64_t most = s->face_offset[s->num_faces] - 2 * s->num_faces;
 
-  *out = (rs_triangles){.corner = rs_alloc(most, sizeof *out->corner), .face = rs_alloc(most, sizeof *out->face)};
+  *out = (rs_triangles){.corner = ra_zeros(most, sizeof *out->corner), .face = ra_zeros(most, sizeof *out->face)};
   if (!out->corner || !out->face) return false;
   for (int64_t f = 0; f < s->num_faces; f++)
     for (int64_t i = s->face_offset[f] + 1; i + 1 < s->face_offset[f + 1]; i++) {
@@ -445,8 +445,8 @@ rsurf_status rsurf_repair(rsurf_surface *s, const char *name, rsurf_repairs *rep
   if (status != RSURF_OK) goto done;
   RS_GOTO(done, status = clean_faces(s, xyz, name, &did, message));
   RS_GOTO(done, status = rs_flip_caps(s, xyz, &did, message));
-  shell  = rs_alloc(s->num_faces, sizeof *shell);
-  turned = rs_alloc(s->num_faces, sizeof *turned);
+  shell  = ra_zeros(s->num_faces, sizeof *shell);
+  turned = ra_zeros(s->num_faces, sizeof *turned);
   RS_GOTO(done, status = shell && turned && rs_find_edges(s, &e) ? RSURF_OK : rs_no_memory(message));
   RS_GOTO(done, status = check_edges(s, &e, name, message));
   RS_GOTO(done, status = spread(s, &e, name, shell, turned, &num_shells, message));

@@ -17,7 +17,7 @@ typedef struct shells {
   int64_t             *first; /* [num + 1] triangles of a shell stand together in `corner` */
   int64_t (*corner)[3];       /* [triangles] sorted by shell */
   int64_t *depth, *parent;    /* [num] shells around it; the innermost of them, -1 */
-  rs_array around;            /* int64_t: shells around each, one list after the other */
+  ra_array around;            /* int64_t: shells around each, one list after the other */
   int64_t *around_at;         /* [num + 1] */
 } shells;
 
@@ -25,11 +25,11 @@ static bool sort_triangles(shells *s)
 {
   const rs_triangles *t = s->triangles;
 
-  s->first     = rs_alloc(s->num + 1, sizeof *s->first);
-  s->corner    = rs_alloc(t->num, sizeof *s->corner);
-  s->depth     = rs_alloc(s->num, sizeof *s->depth);
-  s->parent    = rs_alloc(s->num, sizeof *s->parent);
-  s->around_at = rs_alloc(s->num + 1, sizeof *s->around_at);
+  s->first     = ra_zeros(s->num + 1, sizeof *s->first);
+  s->corner    = ra_zeros(t->num, sizeof *s->corner);
+  s->depth     = ra_zeros(s->num, sizeof *s->depth);
+  s->parent    = ra_zeros(s->num, sizeof *s->parent);
+  s->around_at = ra_zeros(s->num + 1, sizeof *s->around_at);
   if (!s->first || !s->corner || !s->depth || !s->parent || !s->around_at) return false;
   for (int64_t i = 0; i < t->num; i++) s->first[s->of_face[t->face[i]] + 1]++;
   for (int64_t k = 0; k < s->num; k++) s->first[k + 1] += s->first[k];
@@ -76,7 +76,7 @@ static const double *own_corner(const shells *s, const int64_t *shell_of_node, i
 }
 
 /* The shells around shell k, in the list of all: those that a ray from it leaves an odd number of times. */
-static bool shells_around(shells *s, const rs_tree *tree, const double *p, int64_t k, rs_array *hits)
+static bool shells_around(shells *s, const rs_tree *tree, const double *p, int64_t k, ra_array *hits)
 {
   const double box[6] = {p[0], p[1], p[2], INFINITY, p[1], p[2]};
   int64_t     *found, num = 0;
@@ -92,7 +92,7 @@ static bool shells_around(shells *s, const rs_tree *tree, const double *p, int64
   if (num) qsort(found, (size_t)num, sizeof *found, by_number);
   for (int64_t i = 0, end; i < num && ok; i = end) {
     for (end = i + 1; end < num && found[end] == found[i]; end++) continue;
-    if ((end - i) % 2) ok = rs_push(&s->around, &found[i], sizeof *found);
+    if ((end - i) % 2) ok = ra_push(&s->around, &found[i], sizeof *found);
   }
   s->around_at[k + 1] = s->around.count;
   s->depth[k]         = s->around.count - s->around_at[k];
@@ -102,8 +102,8 @@ static bool shells_around(shells *s, const rs_tree *tree, const double *p, int64
 /* depth and around of every shell. */
 static rsurf_status nest(shells *s, const rs_tree *tree, const char *name, rsurf_message *message)
 {
-  int64_t     *shell_of_node = rs_alloc(s->surface->num_nodes, sizeof *shell_of_node); /* -2: several, -1: none yet */
-  rs_array     hits          = {.item = NULL};
+  int64_t     *shell_of_node = ra_zeros(s->surface->num_nodes, sizeof *shell_of_node); /* -2: several, -1: none yet */
+  ra_array     hits          = {.item = NULL};
   rsurf_status status        = shell_of_node ? RSURF_OK : rs_no_memory(message);
 
   for (int64_t i = 0; i < s->surface->num_nodes && status == RSURF_OK; i++) shell_of_node[i] = -1;
@@ -157,10 +157,10 @@ static rsurf_status orient(const shells *s, const char *name, int8_t *turn, rsur
 static rsurf_status number_bodies(const shells *s, rsurf_surface *surface, const int8_t *turn, int8_t *turned,
                                   rsurf_repairs *repairs, rsurf_message *message)
 {
-  int64_t *body = rs_alloc(s->num, sizeof *body);
+  int64_t *body = ra_zeros(s->num, sizeof *body);
 
-  surface->face_body = rs_alloc(surface->num_faces, sizeof *surface->face_body);
-  surface->face_none = rs_alloc(surface->num_faces, sizeof *surface->face_none);
+  surface->face_body = ra_zeros(surface->num_faces, sizeof *surface->face_body);
+  surface->face_none = ra_zeros(surface->num_faces, sizeof *surface->face_none);
   if (!body || !surface->face_body || !surface->face_none) {
     free(body);
     return rs_no_memory(message);
@@ -184,7 +184,7 @@ static rsurf_status number_bodies(const shells *s, rsurf_surface *surface, const
 /* The triangles' boxes; the caller frees. NULL: no memory. */
 static double (*boxes_of(const double *xyz, const rs_triangles *t))[6]
 {
-  double(*box)[6] = rs_alloc(t->num, sizeof *box);
+  double(*box)[6] = ra_zeros(t->num, sizeof *box);
 
   for (int64_t i = 0; box && i < t->num; i++)
     for (int k = 0; k < 3; k++) {
@@ -203,7 +203,7 @@ rsurf_status rs_make_bodies(rsurf_surface *surface, const double *xyz, const cha
   shells  s               = {.surface = surface, .xyz = xyz, .triangles = triangles, .of_face = shell, .num = num_shells};
   rs_tree tree            = {.num = 0};
   double(*box)[6]         = boxes_of(xyz, triangles);
-  int8_t      *turn_shell = rs_alloc(num_shells, sizeof *turn_shell);
+  int8_t      *turn_shell = ra_zeros(num_shells, sizeof *turn_shell);
   rsurf_status status = box && turn_shell && rs_tree_build(triangles->num, (const double(*)[6])box, &tree) && sort_triangles(&s)
                             ? RSURF_OK
                             : rs_no_memory(message);

@@ -1,6 +1,6 @@
 /* surface_private.h -- what the files of the adapter share.
  *
- *   common.c   status and message, growing arrays, a map of keys
+ *   common.c   status and message
  *   read.c     rsurf_read: which format, joining of nodes
  *   stl.c      STL, binary and text
  *   obj.c      OBJ
@@ -14,6 +14,7 @@
 #ifndef REMAP_ADAPTERS_SURFACE_PRIVATE_H
 #define REMAP_ADAPTERS_SURFACE_PRIVATE_H
 
+#include "base.h"
 #include "surface.h"
 
 #include <stdbool.h>
@@ -39,33 +40,6 @@ rsurf_status rs_fail(rsurf_message *message, rsurf_status status, const char *fo
 /* MEMORY, with the words for it. */
 rsurf_status rs_no_memory(rsurf_message *message);
 
-/* calloc, never NULL for 0 items; NULL if memory is short. */
-void *rs_alloc(int64_t count, size_t size);
-
-/* An array that grows: items of one size, owned. All zero is an empty array. */
-typedef struct rs_array {
-  void   *item;
-  int64_t count, capacity;
-} rs_array;
-
-/* Append an item of `size` bytes. false: no memory. */
-bool rs_push(rs_array *array, const void *item, size_t size);
-
-/* A map from keys of up to 3 words to 0, 1, 2 ... in the order they come. All zero, but for width, is an empty map. */
-typedef struct rs_map {
-  int      width;
-  rs_array key;  /* uint64_t [count][width] */
-  int64_t *slot; /* [num_slots] index of a key, -1: free */
-  int64_t  num_slots;
-} rs_map;
-
-/* Index of the key, which is added if new; -1: no memory. */
-int64_t rs_map_add(rs_map *map, const uint64_t *key);
-/* Index of the key, -1: it is not there. */
-int64_t rs_map_find(const rs_map *map, const uint64_t *key);
-/* Give a map back; it is empty then, of the same width. */
-void rs_map_drop(rs_map *map);
-
 /* ---- reading ------------------------------------------------------------------------------------------------------- */
 
 /* A file in memory and the surface that grows from it. text ends with a NUL that is not counted. */
@@ -74,8 +48,8 @@ typedef struct rs_input {
   char          *text;
   size_t         size;
   double         scale;
-  rs_map         nodes; /* by the bits of coordinates: rows of 3 doubles */
-  rs_array       offset, loop, group, names;
+  ra_map         nodes; /* by the bits of coordinates: rows of 3 doubles */
+  ra_array       offset, loop, group, names;
   int32_t        current; /* group of the next face, -1: it has no name yet */
   rsurf_message *message;
 } rs_input;
@@ -114,7 +88,7 @@ typedef struct rs_triangles {
 
 /* Sides of faces, numbered as in face_node: side i runs from that corner to the next one of its loop. */
 typedef struct rs_edges {
-  rs_map   map;       /* its two nodes, the smaller one first */
+  ra_map   map;       /* its two nodes, the smaller one first */
   int64_t *of_side;   /* [sides] edge */
   int64_t (*side)[2]; /* [edges] the first two sides, -1: none */
   int64_t *count;     /* [edges] sides */
@@ -145,7 +119,7 @@ typedef struct rs_tree {
 /* false: no memory; then too the tree must be dropped. */
 bool rs_tree_build(int64_t num, const double (*box)[6], rs_tree *out);
 /* Numbers of the boxes that meet a box, in hits, which is overwritten. false: no memory. */
-bool rs_tree_find(const rs_tree *tree, const double box[6], rs_array *hits);
+bool rs_tree_find(const rs_tree *tree, const double box[6], ra_array *hits);
 /* What hears of two boxes that meet; false: of no more. */
 typedef bool (*rs_visit)(void *user, int64_t one, int64_t other);
 /* Let visit hear of each pair of boxes that meet, once. */

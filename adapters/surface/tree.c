@@ -67,7 +67,7 @@ static void build(rs_tree *tree, int64_t lo, int64_t hi)
 
 bool rs_tree_build(int64_t num, const double (*box)[6], rs_tree *out)
 {
-  *out = (rs_tree){.num = num, .box = box, .item = rs_alloc(num, sizeof *out->item), .part = rs_alloc(num, sizeof *out->part)};
+  *out = (rs_tree){.num = num, .box = box, .item = ra_zeros(num, sizeof *out->item), .part = ra_zeros(num, sizeof *out->part)};
   if (!out->item || !out->part) return false;
   for (int64_t i = 0; i < num; i++) out->item[i] = i;
   build(out, 0, num);
@@ -79,12 +79,12 @@ static bool meets(const double *a, const double *b)
   return a[0] <= b[3] && b[0] <= a[3] && a[1] <= b[4] && b[1] <= a[4] && a[2] <= b[5] && b[2] <= a[5];
 }
 
-static bool find(const rs_tree *tree, int64_t lo, int64_t hi, const double box[6], rs_array *hits)
+static bool find(const rs_tree *tree, int64_t lo, int64_t hi, const double box[6], ra_array *hits)
 {
   const int64_t mid = lo + (hi - lo) / 2;
 
   if (hi - lo < 2)
-    return lo == hi || !meets(tree->box[tree->item[lo]], box) || rs_push(hits, &tree->item[lo], sizeof *tree->item);
+    return lo == hi || !meets(tree->box[tree->item[lo]], box) || ra_push(hits, &tree->item[lo], sizeof *tree->item);
   return !meets(tree->part[mid], box) || (find(tree, lo, mid, box, hits) && find(tree, mid, hi, box, hits));
 }
 
@@ -116,7 +116,7 @@ static bool pairs_within(const rs_tree *tree, int64_t lo, int64_t hi, rs_visit v
 
 void rs_tree_pairs(const rs_tree *tree, rs_visit visit, void *user) { (void)pairs_within(tree, 0, tree->num, visit, user); }
 
-bool rs_tree_find(const rs_tree *tree, const double box[6], rs_array *hits)
+bool rs_tree_find(const rs_tree *tree, const double box[6], ra_array *hits)
 {
   hits->count = 0;
   return find(tree, 0, tree->num, box, hits);

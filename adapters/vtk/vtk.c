@@ -1,6 +1,8 @@
 /* vtk -- a .vtu file: rank 0 writes the XML, all ranks their slices of each array behind it. Linear in the slices. */
 #include "vtk.h"
 
+#include "base.h"
+
 #include <errno.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -39,7 +41,7 @@ static rvtk_status fail(rvtk_message *message, rvtk_status status, const char *f
   va_list args;
 
   va_start(args, format);
-  vsnprintf(message->text, sizeof message->text, format, args);
+  ra_line(message->text, sizeof message->text, format, args);
   va_end(args);
   return status;
 }
@@ -52,17 +54,10 @@ static rvtk_status no_memory(const char *path, rvtk_message *message)
 /* The greatest of the ranks' statuses and the message of the lowest rank that has it. Collective. */
 static rvtk_status agree(MPI_Comm comm, rvtk_status mine, rvtk_message *message)
 {
-  struct {
-    int status, rank;
-  } worst = {(int)mine, 0};
+  const int worst = ra_agree(comm, (int)mine, message->text, sizeof message->text);
 
-  MPI_Comm_rank(comm, &worst.rank);
-  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_2INT, MPI_MAXLOC, comm);
-  if (worst.status == RVTK_OK)
-    message->text[0] = 0;
-  else
-    MPI_Bcast(message->text, (int)sizeof message->text, MPI_CHAR, worst.rank, comm);
-  return (rvtk_status)worst.status;
+  if (worst == RVTK_OK) message->text[0] = 0;
+  return (rvtk_status)worst;
 }
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------------- */

@@ -4,7 +4,7 @@
 #   libremap/src includes neither adapters nor anything outside of libremap but C headers, mpi.h and remap/remap.h;
 #   only comm calls MPI functions, geom includes only base and calls neither MPI nor the allocator;
 #   adapters and examples include <remap/remap.h> alone of the library; only the programs cli and boolean include other
-#   adapters, but for slices, which is for all writers;
+#   adapters, but for base, which is for all, and slices, which is for all writers;
 #   the tests of a room may see the rooms.
 set -eu
 cd "$1"

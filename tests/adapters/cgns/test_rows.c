@@ -84,8 +84,8 @@ static void check_cuts(const section *s, const rc_section *got)
     RT_EQ(cut[i].row % RC_CUT, 0);
     RT_EQ(cut[i].at, s->offset[cut[i].row]);
     RT_EQ(cut[i].cell, s->cells[cut[i].row]);
-    RT_CHECK(cut[i].at >= rc_share(s->length, rt_rank(), rt_size()));
-    RT_CHECK(cut[i].at < rc_share(s->length, rt_rank() + 1, rt_size()));
+    RT_CHECK(cut[i].at >= ra_share(s->length, rt_rank(), rt_size()));
+    RT_CHECK(cut[i].at < ra_share(s->length, rt_rank() + 1, rt_size()));
   }
 }
 
@@ -94,7 +94,7 @@ static void check_reading(const section *s, rcgns_file *file, const rc_zone *zon
 {
   const int64_t lo = tm_random(state, s->num_rows), hi = lo + tm_random(state, s->num_rows - lo + 1);
   const int64_t cell[2] = {s->cells[lo], s->cells[hi]};
-  rc_array      offset = {.item = NULL}, data = {.item = NULL};
+  ra_array      offset = {.item = NULL}, data = {.item = NULL};
   rc_cut        found[2];
   rcgns_message why;
 
@@ -110,8 +110,8 @@ static void check_reading(const section *s, rcgns_file *file, const rc_zone *zon
   RT_EQ(data.count, s->offset[hi] - s->offset[lo]);
   for (int64_t r = lo; r <= hi; r++) RT_EQ(((int64_t *)offset.item)[r - lo], s->offset[r] - s->offset[lo]);
   RT_CHECK(!data.count || !memcmp(data.item, s->row + s->offset[lo], (size_t)data.count * sizeof(int64_t)));
-  rc_drop(&offset);
-  rc_drop(&data);
+  ra_drop(&offset);
+  ra_drop(&data);
 }
 
 static void check_section(const section *s, uint64_t seed)

@@ -300,14 +300,14 @@ static void shares_of_billions_are_even_disjoint_and_complete(void)
       int64_t wrong = 0;
 
       for (int r = 0; r < size[s]; r++) {
-        const int64_t lo = rc_share(total[t], r, size[s]), hi = rc_share(total[t], r + 1, size[s]), each = total[t] / size[s];
+        const int64_t lo = ra_share(total[t], r, size[s]), hi = ra_share(total[t], r + 1, size[s]), each = total[t] / size[s];
 
         wrong += hi - lo < each || hi - lo > each + 1;
-        wrong += rc_owner(total[t], lo, size[s]) != r || rc_owner(total[t], hi - 1, size[s]) != r;
+        wrong += ra_owner(total[t], lo, size[s]) != r || ra_owner(total[t], hi - 1, size[s]) != r;
       }
       RT_EQ(wrong, 0);
-      RT_EQ(rc_share(total[t], 0, size[s]), 0);
-      RT_EQ(rc_share(total[t], size[s], size[s]), total[t]);
+      RT_EQ(ra_share(total[t], 0, size[s]), 0);
+      RT_EQ(ra_share(total[t], size[s], size[s]), total[t]);
     }
 }
 

@@ -1,4 +1,5 @@
 /* Rows of a supermesh that is dealt out to ranks come back in the order of their numbers, whatever rank had them. */
+#include "base.h"
 #include "blocks.h"
 #include "counted.h"
 #include "rt.h"
@@ -9,10 +10,10 @@ static void slices_cover_all_rows_and_differ_by_one(void)
 {
   for (int64_t n = 0; n < 40; n++)
     for (int size = 1; size < 9; size++) {
-      RT_EQ(rslice_begin(n, 0, size), 0);
-      RT_EQ(rslice_begin(n, size, size), n);
+      RT_EQ(ra_share(n, 0, size), 0);
+      RT_EQ(ra_share(n, size, size), n);
       for (int r = 0; r < size; r++) {
-        const int64_t num = rslice_begin(n, r + 1, size) - rslice_begin(n, r, size);
+        const int64_t num = ra_share(n, r + 1, size) - ra_share(n, r, size);
 
         RT_CHECK(num == n / size || num == n / size + 1);
       }
@@ -33,7 +34,7 @@ static void rows_of_any_length_arrive_in_order(void)
   }
   for (int64_t chunk = 1; chunk <= RSLICE_CHUNK; chunk *= 11) {
     RT_EQ(rslice_ship_chunked(MPI_COMM_WORLD, RSLICE_OK, chunk, total, num, global, offset, word, &rows), RSLICE_OK);
-    RT_EQ(rows.first, rslice_begin(total, rt_rank(), rt_size()));
+    RT_EQ(rows.first, ra_share(total, rt_rank(), rt_size()));
     for (int64_t i = 0; i < rows.num; i++) {
       RT_EQ(rows.offset[i + 1] - rows.offset[i], rows.first + i);
       for (int64_t k = rows.offset[i]; k < rows.offset[i + 1]; k++) RT_EQ(rows.word[k], rows.first + i);
