@@ -85,7 +85,8 @@ static laid *lay(const tm_mesh *source, const tm_mesh *target, remap_faces faces
   for (int side = 0; side < 2 && l->status == REMAP_OK; side++) {
     laid_piece_(l, whole[side], side, &plain);
     l->status = rm_trimesh_build(l->arena, &l->frame, &l->part.piece[side], faces, &l->mesh[side]);
-    if (l->status == REMAP_OK) l->status = rm_cells_mesh(l->arena, &l->frame, l->mesh[side], &l->mesh[side]);
+    const rm_trimesh_home home = {l->arena, l->arena, l->arena};
+    if (l->status == REMAP_OK) l->status = rm_cells_mesh(&home, &l->frame, l->mesh[side], &l->mesh[side]);
   }
   return l;
 }
@@ -99,11 +100,12 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
 
   if (l->status != REMAP_OK) fprintf(stderr, "%s\n", l->reason.text), exit(1);
   for (int r = 0; r < repeats; r++) {
-    rm_arena         *arena = rm_arena_new(), *passing = rm_arena_new();
+    rm_arena         *arena = rm_arena_new();
+    rm_cells_passing  passing = {.overlay = rm_arena_new()};
     const rm_overlay *o     = NULL;
     const rm_cells   *cells = NULL;
     const double      t0    = bench_cpu();
-    remap_status      status = rm_overlay_build(passing, l->mesh, &l->part, NULL, &o, &l->reason);
+    remap_status      status = rm_overlay_build(passing.overlay, l->mesh, &l->part, NULL, &o, &l->reason);
     const double      t1     = bench_cpu();
 
     if (status == REMAP_OK) status = rm_cells_build(arena, &l->part, o, &passing, &all, &cells, &l->reason);
@@ -120,7 +122,7 @@ static void run(const char *name, tm_mesh *source, tm_mesh *target, remap_faces 
              1e6 * (overlay + build) / cells->num_cells, (double)rm_arena_bytes(arena) / cells->num_cells,
              (bench_heap_peak() - held) / cells->num_cells);
     rm_arena_drop(arena);
-    rm_arena_drop(passing);
+    rm_arena_drop(passing.overlay);
   }
   laid_free(l);
   tm_free(source);

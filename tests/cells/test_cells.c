@@ -460,7 +460,9 @@ static void memory_that_runs_out_is_told(void)
   const rm_trimesh *mesh[2];
   const rm_overlay *o = NULL;
 
-  for (int side = 0; side < 2; side++) RT_EQ(rm_cells_mesh(l->arena, &l->frame, l->mesh[side], &mesh[side]), REMAP_OK);
+  const rm_trimesh_home home = {l->arena, l->arena, l->arena};
+
+  for (int side = 0; side < 2; side++) RT_EQ(rm_cells_mesh(&home, &l->frame, l->mesh[side], &mesh[side]), REMAP_OK);
   RT_EQ(rm_overlay_build(l->arena, mesh, &l->part, NULL, &o, NULL), REMAP_OK);
 
   while (status == REMAP_NO_MEMORY && n < 100) {

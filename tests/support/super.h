@@ -25,10 +25,11 @@ static inline super super_of(const tm_mesh *source, const tm_mesh *target, remap
   const rm_cells_choice choice = {.keep = keep};
   super                 s      = {.l = laid_over(source, target, faces, how)};
   const rm_overlay     *o      = s.l->overlay;
+  const rm_trimesh_home home   = {s.l->arena, s.l->arena, s.l->arena};
 
   s.status = s.l->status;
   for (int side = 0; side < 2 && s.status == REMAP_OK; side++)
-    s.status = rm_cells_mesh(s.l->arena, &s.l->frame, s.l->mesh[side], &s.mesh[side]);
+    s.status = rm_cells_mesh(&home, &s.l->frame, s.l->mesh[side], &s.mesh[side]);
   if (s.status == REMAP_OK && (s.mesh[0] != s.l->mesh[0] || s.mesh[1] != s.l->mesh[1]))
     s.status = rm_overlay_build(s.l->arena, s.mesh, &s.l->part, NULL, &o, &s.l->reason);
   if (s.status == REMAP_OK) s.status = rm_cells_build(s.l->arena, &s.l->part, o, NULL, &choice, &s.cells, &s.l->reason);

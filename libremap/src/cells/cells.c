@@ -24,16 +24,18 @@ typedef struct work {
 
 /* ---- stages ------------------------------------------------------------------------------------------------------ */
 
-static remap_status make_polygons(work *w, const rm_overlay *overlay, rm_arena **overlay_arena, rm_reason *reason)
+static remap_status make_polygons(work *w, const rm_overlay *overlay, rm_cells_passing *passing, rm_reason *reason)
 {
   const double  start    = rm_seconds();
   rm_arena     *lines[2] = {rm_arena_new(), rm_arena_new()};
-  rm_limit_home home     = {w->arena, {lines[0], lines[1]}, w->limit_arena, overlay_arena};
+  rm_limit_home home     = {w->arena, {lines[0], lines[1]}, w->limit_arena, passing};
   remap_status  status   = lines[0] && lines[1] ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) status = rm_limit_build(&home, w->part, overlay, &w->l, reason);
   if (status == REMAP_OK) status = rm_polygons_build(w->part, w->l, lines, &w->p, reason);
   for (int side = 0; side < 2; side++) rm_arena_drop(lines[side]);
+  rm_arena_drop(passing->around);
+  passing->around          = NULL;
   w->out->num_polygons     = w->p.num;
   w->out->seconds_polygons = rm_seconds() - start;
   return status;
@@ -262,7 +264,7 @@ static void drop(work *w)
   rm_arena_drop(w->faces_arena);
 }
 
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_cells_passing *passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason)
 {
   work         w      = {.arena       = arena,
@@ -271,10 +273,12 @@ remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overl
                          .faces_arena = rm_arena_new(),
                          .part        = part,
                          .choice      = choice};
-  remap_status status = w.limit_arena && w.glued_arena && w.faces_arena ? REMAP_OK : REMAP_NO_MEMORY;
+  rm_cells_passing none   = {NULL, NULL, NULL};
+  remap_status     status = w.limit_arena && w.glued_arena && w.faces_arena ? REMAP_OK : REMAP_NO_MEMORY;
 
   w.out = rm_arena_zero(arena, 1, sizeof *w.out);
   if (!w.out) status = REMAP_NO_MEMORY;
+  if (!passing) passing = &none;
   if (status == REMAP_OK) status = make_polygons(&w, overlay, passing, reason);
   if (status == REMAP_OK) status = make_cells(&w, reason);
   const double start = rm_seconds();

@@ -43,7 +43,7 @@ typedef struct rm_spot {
  *   a loop's normal points out of face_cell[f][0], which is a cell always;
  *   cells are closed and their exact volumes positive (what rounding leaves of a sliver may not be);
  *   cells, faces and vertices are in an order that depends on coordinates alone.
- * vertex, face_offset, face_vertex and face_cell were adopted by the arena: rm_arena_release takes them over. */
+ * Vertices, loops and cells of faces were adopted by the arena: rm_arena_release takes them over. */
 typedef struct rm_cells {
   rm_lid          num_vertices, num_faces, num_cells, num_beyond, num_shared;
   const double  (*vertex)[3];        /* [num_vertices] mesh room's frame                                                     */
@@ -82,16 +82,23 @@ bool rm_has_area(const rm_trimesh *m, rm_lid t);
 
 /* The triangulation that cells are made of: every triangle a facet of its own, and none flat, with its corners on a line: these
  * are left out, and others are cut where such a one had a vertex on their edge, so that what is left is conformal and bounds
- * the same volumes. *out is mesh itself if it is like that; triangle_face stays that of mesh. Not collective. Lives in arena.
- * NO_MEMORY, TOO_LARGE. */
-remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out);
+ * the same volumes. *out is mesh itself if it is like that; triangle_face stays that of mesh. Not collective. Lives in home, as
+ * mesh does. NO_MEMORY, TOO_LARGE. */
+remap_status rm_cells_mesh(const rm_trimesh_home *home, const rm_frame *frame, const rm_trimesh *mesh,
+                           const rm_trimesh **out);
+
+/* Arenas that are dropped, and NULL then, as soon as cells need no more of what they hold; NULL: the caller's. */
+typedef struct rm_cells_passing {
+  rm_arena *walks;   /* of both meshes, see rm_trimesh_home: until it is known where they touch */
+  rm_arena *overlay; /* not with its meshes: until vertices are known                           */
+  rm_arena *around;  /* of both meshes: until polygons are made                                 */
+} rm_cells_passing;
 
 /* Build the cells that choice names. Pieces of one original face between the same two cells become one polygon where they are
  * coplanar and have one loop around them. A face with holes is cut into triangles. Not collective. Lives in arena. BAD_MESH
  * with the cell and the reason if cells of one mesh overlap or cross each other; TOO_LARGE from 2^30 polygons on. The meshes
- * of the overlay are those of rm_cells_mesh. *passing (may be NULL) is the arena that holds the overlay, but not its meshes:
- * it is dropped, and NULL then, as soon as it is used up. O(n log n). */
-remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_arena **passing,
+ * of the overlay are those of rm_cells_mesh. passing may be NULL. O(n log n). */
+remap_status rm_cells_build(rm_arena *arena, const rm_part *part, const rm_overlay *overlay, rm_cells_passing *passing,
                             const rm_cells_choice *choice, const rm_cells **out, rm_reason *reason);
 
 /* Every invariant above but the last; slow. Not collective. INTERNAL if one is broken. */

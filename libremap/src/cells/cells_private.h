@@ -49,9 +49,10 @@ typedef struct rm_limit {
 } rm_limit;
 
 /* Where it lives: spot and xyz, which are the result's; what polygons of either mesh are made from, with the segments in the
- * first; all else. The overlay's is dropped, and NULL then, as soon as it is used up; NULL if it is the caller's. */
+ * first; all else. What passes is dropped as soon as it is used up. */
 typedef struct rm_limit_home {
-  rm_arena *spots, *lines[2], *rest, **overlay;
+  rm_arena *spots, *lines[2], *rest;
+  rm_cells_passing *passing;
 } rm_limit_home;
 
 /* Its meshes are those of the overlay, which it uses up. BAD_MESH with cell and reason where cells overlap. O(n) expected. */

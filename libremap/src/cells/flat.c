@@ -234,7 +234,7 @@ static remap_status restore_faces(rm_arena *arena, const work *w, const rm_trime
   return REMAP_OK;
 }
 
-static remap_status rebuild(rm_arena *arena, const rm_frame *frame, work *w, const rm_trimesh **out)
+static remap_status rebuild(const rm_trimesh_home *home, const rm_frame *frame, work *w, const rm_trimesh **out)
 {
   const rm_trimesh *m = w->m, *made;
   rm_piece          piece;
@@ -247,11 +247,11 @@ static remap_status rebuild(rm_arena *arena, const rm_frame *frame, work *w, con
     if (!w->is_flat[t]) RM_TRY(cut(w, t));
   if (w->num > INT32_MAX) return REMAP_TOO_LARGE;
   RM_TRY(make_piece(w, &piece));
-  RM_TRY(rm_trimesh_build(arena, frame, &piece, REMAP_FACES_DIAGONAL, &made));
-  return restore_faces(arena, w, made, out);
+  RM_TRY(rm_trimesh_build_in(home, frame, &piece, REMAP_FACES_DIAGONAL, &made));
+  return restore_faces(home->mesh, w, made, out);
 }
 
-remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out)
+remap_status rm_cells_mesh(const rm_trimesh_home *home, const rm_frame *frame, const rm_trimesh *mesh, const rm_trimesh **out)
 {
   work         w      = {.scratch = rm_arena_new(), .m = mesh};
   remap_status status = w.scratch ? REMAP_OK : REMAP_NO_MEMORY;
@@ -263,8 +263,8 @@ remap_status rm_cells_mesh(rm_arena *arena, const rm_frame *frame, const rm_trim
     w.is_flat[t] = !rm_has_area(mesh, t);
     any          = any || w.is_flat[t];
   }
-  if (status == REMAP_OK && any) status = rebuild(arena, frame, &w, &mesh);
-  if (status == REMAP_OK && mesh->facet) status = rm_trimesh_of_triangles(arena, mesh, &mesh);
+  if (status == REMAP_OK && any) status = rebuild(home, frame, &w, &mesh);
+  if (status == REMAP_OK && mesh->facet) status = rm_trimesh_of_triangles(home->mesh, mesh, &mesh);
   free(w.inner);
   free(w.corner);
   free(w.old);

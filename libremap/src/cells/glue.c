@@ -102,21 +102,36 @@ static remap_status join_many(work *w, const rm_arc *arc, rm_lid n, bool *joined
   return REMAP_OK;
 }
 
+/* The edge between two vertices, -1. Edges ascend. O(log n). */
+static rm_lid edge_between(const rm_trimesh *m, rm_lid a, rm_lid b)
+{
+  const rm_lid v[2] = {a < b ? a : b, a < b ? b : a};
+  rm_lid       low  = 0, high = m->num_edges;
+
+  while (low < high) {
+    const rm_lid  middle = low + (high - low) / 2;
+    const rm_lid *e      = m->edge[middle];
+
+    if (e[0] < v[0] || (e[0] == v[0] && e[1] < v[1])) low = middle + 1;
+    else high = middle;
+  }
+  return low < m->num_edges && m->edge[low][0] == v[0] && m->edge[low][1] == v[1] ? low : -1;
+}
+
 /* An edge of a mesh on which both spots lie; false if there is none. */
 static bool common_edge(const rm_limit *l, rm_lid p, rm_lid q, const double *line[2])
 {
   for (int side = 0; side < 2; side++) {
     const rm_trimesh *m = l->mesh[side];
-    const rm_feature  f = l->spot[p].at[side];
-    rm_lid            first = 0, last = f.kind == RM_ON_EDGE;
+    const rm_feature  f = l->spot[p].at[side], g = l->spot[q].at[side];
+    rm_lid            e = -1;
 
-    if (f.kind == RM_ON_VERTEX) first = m->vertex_edge_offset[f.id], last = m->vertex_edge_offset[f.id + 1];
-    for (rm_lid k = first; k < last; k++) {
-      const rm_lid e = f.kind == RM_ON_VERTEX ? m->vertex_edge[k] : f.id;
-      if (!rm_on_edge(l, side, q, e)) continue;
-      for (int h = 0; h < 2; h++) line[h] = m->vertex[m->edge[e][h]];
-      return true;
-    }
+    if (f.kind == RM_ON_EDGE && rm_on_edge(l, side, q, f.id)) e = f.id;
+    else if (g.kind == RM_ON_EDGE && rm_on_edge(l, side, p, g.id)) e = g.id;
+    else if (f.kind == RM_ON_VERTEX && g.kind == RM_ON_VERTEX) e = edge_between(m, f.id, g.id);
+    if (e < 0) continue;
+    for (int h = 0; h < 2; h++) line[h] = m->vertex[m->edge[e][h]];
+    return true;
   }
   return false;
 }

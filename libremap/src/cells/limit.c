@@ -430,7 +430,8 @@ static remap_status keep_spots(builder *b)
 {
   rm_spot *spot;
 
-  RM_NEW(spot, b->home->spots, b->l->num_spots);
+  spot = rm_arena_alloc_apart(b->home->spots, b->l->num_spots, sizeof *spot);
+  if (!spot) return REMAP_NO_MEMORY;
   if (b->l->num_spots) memcpy(spot, b->spot, sizeof *spot * (size_t)b->l->num_spots);
   free(b->spot);
   b->spot    = NULL;
@@ -624,6 +625,8 @@ static remap_status build(builder *b)
   for (int side = 0; side < 2; side++) RM_TRY(join_copies(b, side));
   for (int side = 0; side < 2; side++) RM_TRY(place_vertices(b, side));
   RM_TRY(cross_edges(b));
+  rm_arena_drop(b->home->passing->walks);
+  b->home->passing->walks = NULL;
   RM_TRY(vertex_spots(b));
   for (int side = 0; side < 2; side++) RM_TRY(crossing_spots(b, side));
   RM_TRY(keep_spots(b));
@@ -648,9 +651,9 @@ remap_status rm_limit_build(const rm_limit_home *home, const rm_part *part, cons
   free(b.contact);
   free(b.spot);
   rm_arena_drop(b.scratch);
-  if (status == REMAP_OK && home->overlay) {
-    rm_arena_drop(*home->overlay);
-    *home->overlay = NULL;
+  if (status == REMAP_OK) {
+    rm_arena_drop(home->passing->overlay);
+    home->passing->overlay = NULL;
   }
   if (status == REMAP_OK) status = rm_spot_coordinates(home, b.l);
   if (status == REMAP_OK) *out = b.l;

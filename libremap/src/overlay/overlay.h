@@ -100,7 +100,17 @@ static inline bool rm_is_inside_facets(const rm_trimesh *mesh, rm_lid e)
   return mesh->ring_offset[e] == mesh->ring_offset[e + 1];
 }
 
-/* Triangulate a piece. Not collective. Lives in arena. O(n). TOO_LARGE beyond 2^29 triangles. */
+/* Where a triangulation lives, by how long it is needed; two of them, or all, may be one arena. */
+typedef struct rm_trimesh_home {
+  rm_arena *mesh;   /* vertices, triangles, their cells and faces, edges               */
+  rm_arena *around; /* edges of triangles, triangles at edges, edges at vertices       */
+  rm_arena *walks;  /* normals, facets, cells, boxes, skin: what edges are traced with */
+} rm_trimesh_home;
+
+/* Triangulate a piece. Not collective. O(n). TOO_LARGE beyond 2^29 triangles. */
+remap_status rm_trimesh_build_in(const rm_trimesh_home *home, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
+                                 const rm_trimesh **out);
+/* The same, all in one arena. */
 remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
                               const rm_trimesh **out);
 /* The same mesh with every triangle a facet of its own; it shares the arrays of mesh. Not collective. NO_MEMORY. */

@@ -226,7 +226,7 @@ static inline int64_t copies_end(const builder *b, const rm_triple *triple, int6
 }
 
 /* Join two cells' copies of a triangle that lie on opposite sides; any other copies stay apart, each a skin. */
-static remap_status join_triangles(rm_arena *arena, builder *b, const rm_triple *triple, int64_t num, rm_trimesh *m)
+static remap_status join_triangles(const rm_trimesh_home *home, builder *b, const rm_triple *triple, int64_t num, rm_trimesh *m)
 {
   rm_lid (*triangle)[3], (*side)[2], (*face)[2];
   uint8_t *skin;
@@ -236,11 +236,11 @@ static remap_status join_triangles(rm_arena *arena, builder *b, const rm_triple 
 
   RM_TRY(rm_facets_compare(b->scratch, &b->facets, b->piece->num_faces, triple, num));
   for (int64_t i = 0; i < num; after -= joined) i = copies_end(b, triple, i, num, &joined);
-  RM_NEW(triangle, arena, after);
-  RM_NEW(side, arena, after);
-  RM_NEW(skin, arena, after);
-  RM_NEW(face, arena, after);
-  RM_TRY(rm_facets_open(arena, &b->facets, after));
+  RM_NEW(triangle, home->mesh, after);
+  RM_NEW(side, home->mesh, after);
+  RM_NEW(skin, home->mesh, after);
+  RM_NEW(face, home->mesh, after);
+  RM_TRY(rm_facets_open(home->walks, &b->facets, after));
   for (int64_t i = 0; i < num;) {
     const int64_t end = copies_end(b, triple, i, num, &joined);
 
@@ -303,17 +303,17 @@ static remap_status sort_half_edges(rm_arena *scratch, const rm_trimesh *m, rm_l
   return REMAP_OK;
 }
 
-static remap_status number_edges(rm_arena *arena, rm_arena *scratch, rm_trimesh *m)
+static remap_status number_edges(const rm_trimesh_home *home, rm_arena *scratch, rm_trimesh *m)
 {
   const rm_lid nt = m->num_triangles;
   rm_lid (*triangle_edge)[3], (*edge)[2], *star_offset, *star, *offset, num_edges, ne = 0;
   uint64_t *half;
 
   RM_TRY(sort_half_edges(scratch, m, &offset, &half, &num_edges));
-  RM_NEW(triangle_edge, arena, nt);
-  RM_NEW(edge, arena, num_edges);
-  RM_NEW(star_offset, arena, (int64_t)num_edges + 1);
-  RM_NEW(star, arena, 3 * (int64_t)nt);
+  RM_NEW(triangle_edge, home->around, nt);
+  RM_NEW(edge, home->mesh, num_edges);
+  RM_NEW(star_offset, home->around, (int64_t)num_edges + 1);
+  RM_NEW(star, home->around, 3 * (int64_t)nt);
   for (rm_lid v = 0; v < m->num_vertices; v++)
     for (rm_lid i = offset[v]; i < offset[v + 1]; i++) {
       const rm_lid at = (rm_lid)(uint32_t)half[i];
@@ -642,7 +642,7 @@ static remap_status choose_walks(rm_arena *arena, rm_arena *scratch, rm_trimesh 
 
 /* ------------------------------------------------------------------------------------------------------------------ */
 
-static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_trimesh *m)
+static remap_status build(const rm_trimesh_home *home, builder *b, remap_faces faces, rm_trimesh *m)
 {
   rm_lid        *vertex_of;
   rm_triple *triple;
@@ -651,35 +651,41 @@ static remap_status build(rm_arena *arena, builder *b, remap_faces faces, rm_tri
 
   RM_TRY(triangulate_faces(b, faces));
   RM_NEW(vertex_of, b->scratch, b->num_points);
-  RM_TRY(number_vertices(arena, b, vertex_of, m));
+  RM_TRY(number_vertices(home->mesh, b, vertex_of, m));
   RM_TRY(collect_triples(b, vertex_of, m->num_vertices, &triple, &num_triples));
-  RM_TRY(join_triangles(arena, b, triple, num_triples, m));
-  RM_NEW(normal, arena, m->num_triangles);
+  RM_TRY(join_triangles(home, b, triple, num_triples, m));
+  RM_NEW(normal, home->walks, m->num_triangles);
   for (rm_lid t = 0; t < m->num_triangles; t++) triangle_normal(m, t, normal[t]);
   m->normal = (const double (*)[3])normal;
-  RM_TRY(number_edges(arena, b->scratch, m));
-  RM_TRY(edges_at_vertices(arena, m));
-  RM_TRY(triangles_of_cells(arena, m));
-  RM_TRY(vertices_of_cells(arena, b->scratch, m));
-  RM_TRY(boxes(arena, m));
-  RM_TRY(collect_skin(arena, m));
-  RM_TRY(rm_facets_finish(arena, b->scratch, &b->facets, m));
-  return choose_walks(arena, b->scratch, m);
+  RM_TRY(number_edges(home, b->scratch, m));
+  RM_TRY(edges_at_vertices(home->around, m));
+  RM_TRY(triangles_of_cells(home->walks, m));
+  RM_TRY(vertices_of_cells(home->walks, b->scratch, m));
+  RM_TRY(boxes(home->walks, m));
+  RM_TRY(collect_skin(home->walks, m));
+  RM_TRY(rm_facets_finish(home->walks, b->scratch, &b->facets, m));
+  return choose_walks(home->walks, b->scratch, m);
 }
 
-remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
-                              const rm_trimesh **out)
+remap_status rm_trimesh_build_in(const rm_trimesh_home *home, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
+                                 const rm_trimesh **out)
 {
   builder      b = {.scratch = rm_arena_new(), .frame = frame, .piece = piece};
-  rm_trimesh  *m = rm_arena_zero(arena, 1, sizeof *m);
+  rm_trimesh  *m = rm_arena_zero(home->mesh, 1, sizeof *m);
   remap_status status = b.scratch && m ? REMAP_OK : REMAP_NO_MEMORY;
 
   if (status == REMAP_OK) {
     m->num_cells = piece->num_cells;
-    status       = build(arena, &b, faces, m);
+    status       = build(home, &b, faces, m);
   }
   rm_arena_drop(b.scratch);
   RM_ASSERT(status != REMAP_OK || rm_trimesh_check(frame, m) != REMAP_INTERNAL);
   if (status == REMAP_OK) *out = m;
   return status;
+}
+
+remap_status rm_trimesh_build(rm_arena *arena, const rm_frame *frame, const rm_piece *piece, remap_faces faces,
+                              const rm_trimesh **out)
+{
+  return rm_trimesh_build_in(&(rm_trimesh_home){arena, arena, arena}, frame, piece, faces, out);
 }

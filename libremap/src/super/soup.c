@@ -275,6 +275,7 @@ remap_status rm_soup_add_cells(rm_soup *soup, rm_arena *arena, const rm_part *pa
 
   RM_ASSERT(soup->num_faces == 0 && soup->num_cells == 0);
   rm_arena_drop(passing);
+  free(rm_arena_release(arena, cells->vertex_spot));
   RM_TRY(status);
   RM_TRY(cell_room(rm_reserve, soup, cells->num_cells));
   for (rm_lid c = 0; c < cells->num_cells; c++) RM_TRY(add_cell(soup, part, cells, c));

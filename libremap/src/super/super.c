@@ -7,8 +7,8 @@
 
 typedef struct work {
   const rm_super_job *job;
-  rm_arena           *passing;       /* of all that the result does not need */
-  rm_arena           *overlay_arena; /* of crossings and segments */
+  rm_arena           *passing; /* of all that the result does not need        */
+  rm_cells_passing    early;   /* of what is given back before cells are made */
   const rm_cover     *cover;
   const rm_trimesh   *mesh[2];
   const rm_cells     *cells;
@@ -65,22 +65,23 @@ static remap_status make_cells(work *w, bool *regular, rm_reason *reason)
                                             {w->cover->flag[0], w->cover->flag[1]},
                                             options->aggregate != 0,
                                             options->split_concave != 0};
+  const rm_trimesh_home home = {w->passing, w->early.around, w->early.walks};
   const rm_trimesh     *given[2];
   const rm_overlay     *overlay = NULL;
   double                start   = rm_seconds();
 
   for (int side = 0; side < 2; side++) {
-    RM_TRY(rm_trimesh_build(w->passing, w->job->frame, &w->cover->part.piece[side], w->job->faces, &given[side]));
-    RM_TRY(rm_cells_mesh(w->passing, w->job->frame, given[side], &w->mesh[side]));
+    RM_TRY(rm_trimesh_build_in(&home, w->job->frame, &w->cover->part.piece[side], w->job->faces, &given[side]));
+    RM_TRY(rm_cells_mesh(&home, w->job->frame, given[side], &w->mesh[side]));
     w->figures.num_triangles[side] = w->mesh[side]->num_triangles;
   }
   w->figures.seconds_triangulation += rm_seconds() - start;
   RM_TRY(tell(w, "triangulation", 1));
   start = rm_seconds();
-  RM_TRY(rm_overlay_build(w->overlay_arena, w->mesh, &w->cover->part, w->job->progress, &overlay, reason));
+  RM_TRY(rm_overlay_build(w->early.overlay, w->mesh, &w->cover->part, w->job->progress, &overlay, reason));
   w->figures.seconds_crossings += rm_seconds() - start;
   w->figures.num_crossings = overlay->trace[0].num_crossings + overlay->trace[1].num_crossings;
-  RM_TRY(rm_cells_build(w->passing, &w->cover->part, overlay, &w->overlay_arena, &choice, &w->cells, reason));
+  RM_TRY(rm_cells_build(w->passing, &w->cover->part, overlay, &w->early, &choice, &w->cells, reason));
   w->figures.num_polygons = w->cells->num_polygons;
   w->figures.seconds_polygons += w->cells->seconds_polygons;
   w->figures.seconds_cells += w->cells->seconds_glue;
@@ -91,9 +92,12 @@ static remap_status make_cells(work *w, bool *regular, rm_reason *reason)
 
 static void drop_passing(work *w)
 {
-  rm_arena_drop(w->overlay_arena);
+  rm_arena_drop(w->early.walks);
+  rm_arena_drop(w->early.overlay);
+  rm_arena_drop(w->early.around);
   rm_arena_drop(w->passing);
-  w->overlay_arena = w->passing = NULL;
+  w->early   = (rm_cells_passing){NULL, NULL, NULL};
+  w->passing = NULL;
 }
 
 /* The cells of this rank's core; *regular, on all ranks, if others can pass beside them. Collective. */
@@ -102,9 +106,10 @@ static remap_status make_core(work *w, const bool all[2], bool *regular, rm_reas
   int64_t irregular;
 
   drop_passing(w);
-  w->passing       = rm_arena_new();
-  w->overlay_arena = rm_arena_new();
-  RM_TRY(rm_comm_agree(w->job->comm, w->passing && w->overlay_arena ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  w->passing = rm_arena_new();
+  w->early   = (rm_cells_passing){rm_arena_new(), rm_arena_new(), rm_arena_new()};
+  const bool ready = w->passing && w->early.walks && w->early.overlay && w->early.around;
+  RM_TRY(rm_comm_agree(w->job->comm, ready ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_TRY(cover(w, all, reason));
   RM_TRY(rm_comm_agree_reason(w->job->comm, make_cells(w, regular, reason), reason));
   irregular = !*regular;

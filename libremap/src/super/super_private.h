@@ -86,7 +86,7 @@ remap_status rm_soup_add_cell(rm_soup *soup, const rm_soup_cell *cell);
 static inline int rm_soup_rank(const int *rank, const rm_lid *from, int64_t k) { return rank ? rank[k] : from[k] < 0 ? -1 : 0; }
 
 /* Begin with what room cells made: vertex k, face k, cell k of it are those of the soup, which takes its vertices, loops and
- * cells of faces from arena. NO_MEMORY, TOO_LARGE. */
+ * cells of faces from arena; what its vertices are is given back. NO_MEMORY, TOO_LARGE. */
 remap_status rm_soup_add_cells(rm_soup *soup, rm_arena *arena, const rm_part *part, const rm_trimesh *const mesh[2],
                                const rm_cells *cells);
 
