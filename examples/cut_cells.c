@@ -230,16 +230,8 @@ static int write_mesh(const char *path, const remap_supermesh_view *v)
 /* The space left over must be the box without the body. Returns 0 if it is. */
 static int check_volume(int rank, const remap_supermesh_view *v, double body)
 {
-  const double box = SIDE * NX * SIDE * NY * SIDE * NZ;
-  double       sum = 0, rest = 0;
+  const double box = SIDE * NX * SIDE * NY * SIDE * NZ, sum = v->volume[1];
 
-  for (int64_t c = 0; c < v->num_cells; c++) { /* compensated (Kahan) */
-    const double add = v->cell_volume[c] - rest, next = sum + add;
-
-    rest = (next - sum) - add;
-    sum  = next;
-  }
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
   if (rank == 0) printf("volume %.15g, the box without the body %.15g: %.1e apart\n", sum, box - body, fabs(sum - box + body));
   return fabs(sum - box + body) > 1e-12 * box;
 }

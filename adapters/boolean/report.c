@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <jansson.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -18,32 +17,6 @@ static int kind_of(const remap_supermesh_view *view, int64_t cell)
   return view->cell_ancestor[0][cell] < 0 ? 2 : view->cell_ancestor[1][cell] < 0;
 }
 
-/* The volume of each kind, with the same digits on any number of ranks. Each volume is cut into three whole numbers of 30 bits,
- * in units of about 2^-30, 2^-60, 2^-90 of the largest: these add up alike in any order. Smaller digits are left out. */
-static void sum_volumes(MPI_Comm comm, const remap_supermesh_view *view, double volume[3])
-{
-  int64_t sum[3][3] = {{0}};
-  double  largest   = 0;
-  int     exponent;
-
-  for (int64_t c = 0; c < view->num_cells; c++) largest = fmax(largest, fabs(view->cell_volume[c]));
-  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
-  frexp(largest, &exponent); /* below 2^exponent */
-  for (int64_t c = 0; c < view->num_cells; c++) {
-    double rest = ldexp(view->cell_volume[c], 30 - exponent);
-
-    for (int i = 0; i < 3; i++) {
-      const int64_t whole = (int64_t)rest;
-
-      sum[kind_of(view, c)][i] += whole;
-      rest = ldexp(rest - (double)whole, 30);
-    }
-  }
-  MPI_Allreduce(MPI_IN_PLACE, sum, 9, MPI_INT64_T, MPI_SUM, comm);
-  for (int k = 0; k < 3; k++)
-    volume[k] = ldexp((double)sum[k][0] + 0x1p-30 * ((double)sum[k][1] + 0x1p-30 * (double)sum[k][2]), exponent - 30);
-}
-
 void bool_report_count(MPI_Comm comm, const remap_supermesh_view *view, bool_report *report)
 {
   int64_t count[6]   = {0, 0, 0, view->num_triangles[0], view->num_triangles[1], view->num_crossings};
@@ -52,7 +25,7 @@ void bool_report_count(MPI_Comm comm, const remap_supermesh_view *view, bool_rep
 
   report->view = *view;
   for (int64_t c = 0; c < view->num_cells; c++) count[kind_of(view, c)]++;
-  sum_volumes(comm, view, report->volume);
+  memcpy(report->volume, view->volume, sizeof report->volume);
   MPI_Allreduce(MPI_IN_PLACE, count, 6, MPI_INT64_T, MPI_SUM, comm);
   MPI_Allreduce(MPI_IN_PLACE, seconds, 7, MPI_DOUBLE, MPI_MAX, comm);
   memcpy(report->cells, count, sizeof report->cells);

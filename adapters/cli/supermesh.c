@@ -77,11 +77,9 @@ cli_exit cli_supermesh_write(cli_job *j, cli_failure *why)
       cli_note(j, "%s: zones overlap by rounding; a volume of %.3g that two of them have counts once in the supermesh",
                j->options.path[side], view.zone_overlap[side]);
   row->cells  = view.global_cells;
-  row->volume = 0;
-  for (int64_t c = 0; c < view.num_cells; c++) row->volume += view.cell_volume[c];
-  MPI_Allreduce(MPI_IN_PLACE, &row->volume, 1, MPI_DOUBLE, MPI_SUM, j->comm);
-  ancestor = malloc(((size_t)view.num_cells + 1) * sizeof *ancestor);
-  code     = cli_agree(j, ancestor ? CLI_DONE : cli_no_memory(why), why);
+  row->volume = view.volume[0]; /* all of it is in both */
+  ancestor    = malloc(((size_t)view.num_cells + 1) * sizeof *ancestor);
+  code        = cli_agree(j, ancestor ? CLI_DONE : cli_no_memory(why), why);
   if (code == CLI_DONE) code = write_supermesh(j, &view, ancestor, why);
   free(ancestor);
   if (code == CLI_DONE) row->path = j->options.supermesh;

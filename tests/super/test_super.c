@@ -143,7 +143,7 @@ static void is_the_union(const world *w)
 {
   const remap_supermesh_view *v = &w->v;
   const int64_t               n[2] = {w->mine[0]->view.num_cells, w->mine[1]->view.num_cells};
-  double                     *own[2], *sum[2], *pair = tm_alloc_(n[0] * n[1], sizeof *pair), worst = 0;
+  double                     *own[2], *sum[2], *pair = tm_alloc_(n[0] * n[1], sizeof *pair), worst = 0, kind[3] = {0, 0, 0};
   remap_context              *moments;
   remap_pairs_view            p;
   remap_options               how;
@@ -163,10 +163,12 @@ static void is_the_union(const world *w)
   }
   for (int64_t c = 0; c < v->num_cells; c++) {
     const int64_t a = v->cell_ancestor[0][c], b = v->cell_ancestor[1][c];
+    kind[a < 0 ? 2 : b < 0] += v->cell_volume[c];
     if (a >= 0) sum[0][a] += v->cell_volume[c];
     if (b >= 0) sum[1][b] += v->cell_volume[c];
     if (a >= 0 && b >= 0) pair[a * n[1] + b] += v->cell_volume[c];
   }
+  for (int k = 0; k < 3; k++) RT_NEAR(kind[k], v->volume[k], 1e-13 * v->volume[k]);
   for (int64_t t = 0; t < p.num_rows; t++)
     for (int64_t k = p.row_offset[t]; k < p.row_offset[t + 1]; k++) pair[p.global_cell[k] * n[1] + t] -= p.volume[k];
   for (int64_t k = 0; k < n[0] * n[1]; k++) worst = fmax(worst, fabs(pair[k]) / fmin(own[0][k / n[1]], own[1][k % n[1]]));
@@ -188,6 +190,8 @@ static void same_bits(const remap_supermesh_view *all, const remap_supermesh_vie
   RT_EQ(v->global_cells, all->num_cells);
   RT_EQ(v->global_faces, all->num_faces);
   RT_EQ(v->global_nodes, all->num_nodes);
+  RT_CHECK(memcmp(v->volume, all->volume, sizeof v->volume) == 0);
+  RT_CHECK(memcmp(v->zone_overlap, all->zone_overlap, sizeof v->zone_overlap) == 0);
   if (v->global_cells != all->num_cells || v->global_faces != all->num_faces || v->global_nodes != all->num_nodes) return;
   for (int64_t k = 0; k < v->num_nodes; k++)
     bad += memcmp(v->node_xyz + 3 * k, all->node_xyz + 3 * v->node_global[k], 3 * sizeof(double)) != 0;

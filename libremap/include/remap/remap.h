@@ -376,6 +376,8 @@ typedef struct remap_supermesh_view {
   const int64_t *cell_ancestor[2];  /**< [side][num_cells] global id of the cell of that mesh, -1: outside */
   const double  *cell_volume;       /**< [num_cells] of the exact cell, caller's unit cubed               */
 
+  double volume[3]; /**< of all ranks' cells: those in both meshes, in the source alone, in the target alone. Exact sums of
+                         cell_volume, rounded once */
   double zone_overlap[2]; /**< [side] volume, over all ranks, of cells that lie in two zones of that mesh, which overlap by
                                rounding; their ancestor is the cell of the zone that comes first */
 

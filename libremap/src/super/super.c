@@ -188,6 +188,19 @@ static remap_status explain(const rm_comm *comm, const rm_conformed whole[2], re
   return status;
 }
 
+/* Volumes over all ranks, by the meshes that cells lie in. Collective. */
+static remap_status sum_volumes(const rm_comm *comm, remap_supermesh_view *view)
+{
+  rm_sum sum[3];
+
+  for (int k = 0; k < 3; k++) rm_sum_clear(&sum[k]);
+  for (int64_t c = 0; c < view->num_cells; c++)
+    rm_sum_add(&sum[view->cell_ancestor[0][c] < 0 ? 2 : view->cell_ancestor[1][c] < 0 ? 1 : 0], view->cell_volume[c]);
+  RM_TRY(rm_comm_sum_exact(comm, sum, 3));
+  for (int k = 0; k < 3; k++) view->volume[k] = rm_sum_value(&sum[k]);
+  return REMAP_OK;
+}
+
 remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_super **out, rm_reason *reason)
 {
   rm_arena      *own[2]   = {rm_arena_new(), rm_arena_new()};
@@ -212,6 +225,7 @@ remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_s
     super->view.zone_overlap[side] = whole[side].overlap * unit * unit * unit;
     if (whole[side].mesh) status = rm_super_retrace(arena, job->comm, side, &whole[side], super);
   }
+  if (status == REMAP_OK) status = sum_volumes(job->comm, &super->view);
   if (status == REMAP_OK) *out = super;
   for (int side = 0; side < 2; side++) rm_arena_drop(own[side]);
   return status;

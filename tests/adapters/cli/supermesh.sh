@@ -28,6 +28,9 @@ hold $? "a name in .vtu gives VTK"
 for n in 1 2 3 4; do
   works "$n" -q source.cgns target.cgns -o out.cgns --supermesh "on$n.cgns" --report report.json
   cmp -s on1.cgns "on$n.cgns" || complain "other bytes on $n ranks"
+  volume=$(value supermesh volume)
+  [ "$n" -gt 1 ] || alone=$volume
+  [ "$volume" = "$alone" ] || complain "another volume on $n ranks"
 done
 near "$(value supermesh volume)" 1 1e-14
 [ "$(value supermesh cells)" -ge "$(value overlap pairs)" ] || complain "fewer cells than pairs"
