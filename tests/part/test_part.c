@@ -486,10 +486,11 @@ static remap_status run_stages(world *w, rm_arena *arena)
 
   RM_TRY(rm_part_cut_evenly(arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts));
   RM_TRY(rm_part_send_tags(arena, arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts, &tags, &reason));
-  RM_TRY(rm_part_find_giants(arena, arena, comm, &tags, &giants));
+  RM_TRY(rm_part_find_giants(arena, comm, &tags, &giants));
   RM_TRY(rm_part_weigh(arena, arena, comm, w->in.mesh, &tags, &giants, work));
   RM_TRY(rm_part_cut_work(arena, comm, &tags, work, &cuts));
   RM_TRY(rm_part_move_tags(arena, comm, &tags, &cuts, &moved, &reason));
+  RM_TRY(rm_part_meet_giants(arena, arena, comm, &moved, &giants));
   RM_TRY(rm_part_match(arena, arena, comm, &cuts, &moved, &giants, &rm_one_block, &routes));
   return rm_part_ship(w->in.arena, arena, &w->in.comm, w->in.mesh[REMAP_SOURCE], &routes.of[REMAP_SOURCE], &piece,
                       &reason);

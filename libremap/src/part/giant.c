@@ -1,6 +1,6 @@
 /* giant -- a cell that meets more than one in GIANT_SHARE times the ranks of the other mesh's cells would bring them all to its
  * rank. It is a giant instead: replicated to where they are. How many a cell meets is estimated from crowds of the other mesh's
- * tags: O(n log B) time for n tags and B crowds that are near. */
+ * tags: O(n log B) time for n tags and B crowds that are near. A rank knows of those giants that may meet its tags. */
 #include "part/part_private.h"
 
 #include <string.h>
@@ -51,13 +51,20 @@ static int64_t mark_giants(const rm_comm *comm, const rm_crowds *other, int64_t 
   return found;
 }
 
-/* This rank's giants. Not collective. */
-static remap_status list_giants(rm_arena *scratch, const rm_tags *tags, int64_t num, rm_giant **out)
+/* This rank's giants, and the boxes of all its tags. Not collective. */
+static remap_status list_giants(rm_arena *scratch, const rm_tags *tags, int64_t *num, rm_giant **out, double (**box)[6])
 {
-  int64_t   n = 0;
+  int64_t   n = 0, most = 0;
   rm_giant *giant;
 
-  RM_NEW(giant, scratch, num);
+  RM_REQUIRE((int64_t)tags->num[0] + tags->num[1] <= INT32_MAX, REMAP_TOO_LARGE);
+  for (int side = 0; side < 2; side++)
+    for (rm_lid k = 0; k < tags->num[side]; k++) most += tags->tag[side][k].is_giant;
+  RM_NEW(giant, scratch, most);
+  RM_NEW(*box, scratch, (int64_t)tags->num[0] + tags->num[1]);
+  for (int side = 0; side < 2; side++)
+    if (tags->num[side] > 0)
+      memcpy(*box + (side ? tags->num[0] : 0), tags->box[side], (size_t)tags->num[side] * sizeof **box);
   for (int side = 0; side < 2; side++)
     for (rm_lid k = 0; k < tags->num[side]; k++) {
       const rm_tag *tag = &tags->tag[side][k];
@@ -67,39 +74,88 @@ static remap_status list_giants(rm_arena *scratch, const rm_tags *tags, int64_t 
                             .num_triangles = tag->num_triangles};
       memcpy(giant[n++].box, tags->box[side][k], sizeof giant->box);
     }
-  RM_ASSERT(n == num);
+  *num = n;
   *out = giant;
   return REMAP_OK;
 }
 
-remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *giant, rm_giants *out)
+remap_status rm_part_no_giants(rm_arena *arena, rm_giants *out)
+{
+  *out = (rm_giants){.num = 0};
+  return rm_boxtree_build(arena, 0, NULL, &out->tree);
+}
+
+/* These giants, and a tree over them. Not collective. */
+static remap_status know_giants(rm_arena *arena, int64_t num, const rm_giant *giant, rm_giants *out)
 {
   double (*box)[6];
 
   RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
   RM_NEW(box, arena, num);
   for (int64_t g = 0; g < num; g++) memcpy(box[g], giant[g].box, sizeof *box);
-  *out = (rm_giants){(rm_lid)num, giant, (const double(*)[6])box, NULL};
+  out->num   = (rm_lid)num;
+  out->giant = giant;
+  out->box   = (const double(*)[6])box;
   return rm_boxtree_build(arena, out->num, out->box, &out->tree);
 }
 
-remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out)
+remap_status rm_part_meet_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_tags *tags, rm_giants *out)
 {
-  int64_t     *offset   = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset), num = 0;
-  int64_t      total[2] = {tags->num[0], tags->num[1]};
-  rm_giant    *mine     = NULL;
-  rm_crowds    crowds[2];
-  void        *all;
-  remap_status status   = offset ? REMAP_OK : REMAP_NO_MEMORY;
+  int64_t   num = 0, met;
+  rm_giant *mine    = NULL;
+  double  (*box)[6] = NULL;
+  void     *all;
 
-  RM_TRY(rm_comm_agree(comm, status, NULL));
-  RM_ASSERT(offset);
+  RM_TRY(rm_comm_agree(comm, list_giants(scratch, tags, &num, &mine, &box), NULL));
+  RM_TRY(rm_boxes_meet(arena, comm, sizeof *mine, num, mine, tags->num[0] + tags->num[1], (const double(*)[6])box, &met, &all));
+  return rm_comm_agree(comm, know_giants(arena, met, all, out), NULL);
+}
+
+remap_status rm_part_find_giants(rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out)
+{
+  int64_t   total[2] = {tags->num[0], tags->num[1]}, num = 0;
+  rm_crowds crowds[2];
+
   RM_TRY(rm_comm_sum_i64(comm, total, 2));
   for (int side = 0; side < 2; side++)
     RM_TRY(rm_part_crowds(scratch, comm, tags, side, tags->num[1 - side], (const double(*)[6])tags->box[1 - side],
                           RM_SOME_CROWDS, &crowds[side]));
   for (int side = 0; side < 2; side++) num += mark_giants(comm, &crowds[1 - side], total[1 - side], side, tags);
-  RM_TRY(rm_comm_agree(comm, list_giants(scratch, tags, num, &mine), NULL));
-  RM_TRY(rm_comm_allgatherv(comm, arena, mine, num, sizeof *mine, offset, &all));
-  return rm_comm_agree(comm, rm_part_know_giants(arena, offset[comm->size], all, out), NULL);
+  RM_TRY(rm_comm_sum_i64(comm, &num, 1));
+  RM_TRY(rm_comm_agree(comm, rm_part_no_giants(scratch, out), NULL));
+  out->num_everywhere = num;
+  return num > 0 ? rm_part_meet_giants(scratch, scratch, comm, tags, out) : REMAP_OK;
+}
+
+/* The giants of a side that are seated here, by their homes; offset is [comm->size + 1]. Not collective. */
+static remap_status list_homes(rm_arena *scratch, const rm_comm *comm, const rm_tags *tags, int side, int64_t *offset,
+                               rm_lid **cell)
+{
+  int64_t *next;
+
+  for (int r = 0; r <= comm->size; r++) offset[r] = 0;
+  for (rm_lid k = 0; k < tags->num[side]; k++) offset[tags->tag[side][k].home_rank] += tags->tag[side][k].is_giant;
+  RM_NEW(*cell, scratch, rm_offsets(offset, comm->size));
+  RM_NEW(next, scratch, comm->size);
+  for (int r = 0; r < comm->size; r++) next[r] = offset[r];
+  for (rm_lid k = 0; k < tags->num[side]; k++)
+    if (tags->tag[side][k].is_giant) (*cell)[next[tags->tag[side][k].home_rank]++] = tags->tag[side][k].cell;
+  return REMAP_OK;
+}
+
+remap_status rm_part_giants_at_home(rm_arena *scratch, const rm_comm *comm, const rm_tags *tags, int side, int64_t *num,
+                                    const rm_lid **cell)
+{
+  int64_t     *offset  = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
+  int64_t     *arrived = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *arrived);
+  rm_lid      *send    = NULL;
+  void        *recv;
+  remap_status status = offset && arrived ? list_homes(scratch, comm, tags, side, offset, &send) : REMAP_NO_MEMORY;
+
+  RM_TRY(rm_comm_agree(comm, status, NULL));
+  RM_ASSERT(offset && arrived);
+  RM_TRY(rm_comm_exchange(comm, scratch, sizeof *send, offset, send, arrived, &recv));
+  *num  = arrived[comm->size];
+  *cell = recv;
+  return REMAP_OK;
 }

@@ -16,10 +16,15 @@ static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_mesh 
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_GOTO(done, status = rm_part_find_giants(arena, scratch, comm, tags, giants));
+  RM_GOTO(done, status = rm_part_find_giants(scratch, comm, tags, giants));
   RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, mesh, tags, giants, work));
   RM_GOTO(done, status = rm_part_cut_work(arena, comm, tags, work, cuts));
   RM_GOTO(done, status = rm_part_move_tags(arena, comm, tags, cuts, moved, reason));
+  if (giants->num_everywhere > 0) {
+    status = rm_part_meet_giants(arena, scratch, comm, moved, giants);
+  } else {
+    status = rm_comm_agree(comm, rm_part_no_giants(arena, giants), NULL);
+  }
 done:
   rm_arena_drop(scratch);
   return status;
@@ -48,14 +53,14 @@ static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm
   rm_frame  zone_frame;
   rm_cuts   cuts;
   rm_tags   tags, moved;
-  rm_giants giants = {0, NULL, NULL, NULL};
+  rm_giants giants = {.num = 0};
 
   RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
   RM_TRY(seat_evenly(scratch, comm, &zone_frame, mesh, zone, &cuts, &tags, reason));
   if (comm->size > 1) {
     RM_TRY(balance(scratch, comm, mesh, &tags, &giants, &cuts, &moved, reason));
   } else {
-    RM_TRY(rm_part_know_giants(scratch, 0, NULL, &giants));
+    RM_TRY(rm_part_no_giants(scratch, &giants));
     moved = tags;
   }
   return rm_part_match(arena, scratch, comm, &cuts, &moved, &giants, slicing, out);

@@ -3,7 +3,7 @@
  *
  *   tag      tags of the zone's cells go to the ranks in whose interval of keys they lie, at first of equal numbers (cut)
  *   crowd    coarse boxes tell a rank where tags are that may meet its own
- *   giant    the cells that meet a large part of the other mesh are found, and known to all ranks
+ *   giant    the cells that meet a large part of the other mesh are found, and known where they meet something
  *   weigh    estimates the work that each cell's pairs make; intervals of equal work are cut, and the tags move on
  *   match    every rank lists the cells its blocks need, and asks their homes for those of other ranks
  *   ship     cells with their faces and nodes travel; those of a block are taken out of what is there
@@ -78,10 +78,11 @@ typedef struct rm_giant {
 } rm_giant;
 
 typedef struct rm_giants {
-  rm_lid            num;      /* of both sides, all ranks; the same on every rank */
-  const rm_giant   *giant;    /* [num]                                            */
-  const double    (*box)[6];  /* [num]                                            */
-  const rm_boxtree *tree;     /* over them                                        */
+  int64_t           num_everywhere; /* of both sides, all ranks; the same on every rank                   */
+  rm_lid            num;            /* those seated here, and all others that meet the box of a tag here  */
+  const rm_giant   *giant;          /* [num]                                                              */
+  const double    (*box)[6];        /* [num]                                                              */
+  const rm_boxtree *tree;           /* over them                                                          */
 } rm_giants;
 
 /* A source tag of another seat that may meet a target here. */
@@ -145,12 +146,19 @@ remap_status rm_part_crowds(rm_arena *arena, const rm_comm *comm, const rm_tags 
  * with what is needed on the way. TOO_LARGE. */
 remap_status rm_part_receive_visitors(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, rm_visitors *out);
 
-/* Mark the tags of giants, and tell all ranks of them. Collective. *out lives in arena, what is needed on the way in
- * scratch. */
-remap_status rm_part_find_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out);
+/* Mark the tags of giants, and tell the ranks of those that they meet. Collective. *out lives in scratch. */
+remap_status rm_part_find_giants(rm_arena *scratch, const rm_comm *comm, rm_tags *tags, rm_giants *out);
 
-/* These giants, and a tree over them. Not collective. *out borrows giant, [num], the rest lives in arena. */
-remap_status rm_part_know_giants(rm_arena *arena, int64_t num, const rm_giant *giant, rm_giants *out);
+/* Tell the ranks, on which marked tags are elsewhere, of the giants that they meet: num_everywhere is known and stays.
+ * Collective. *out lives in arena, what is needed on the way in scratch. TOO_LARGE. */
+remap_status rm_part_meet_giants(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_tags *tags, rm_giants *out);
+
+/* There are none. Not collective. *out lives in arena. */
+remap_status rm_part_no_giants(rm_arena *arena, rm_giants *out);
+
+/* The giants of a side that this rank handed in, by their numbers there. Collective. *cell lives in scratch. */
+remap_status rm_part_giants_at_home(rm_arena *scratch, const rm_comm *comm, const rm_tags *tags, int side, int64_t *num,
+                                    const rm_lid **cell);
 
 /* An estimate of the work that is done at its seat because of each tag, in units of 1/64 of what an edge and a face that cross
  * cost. Collective. *work[side], [tags->num[side]], live in arena, what is needed on the way in scratch. */

@@ -174,25 +174,19 @@ static void box_of_face(const rm_mesh *mesh, rm_lid face, double box[6])
     }
 }
 
-/* The boxes of the faces of this rank's giants of one mesh. Not collective. */
-static remap_status list_faces(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_giants *giants,
-                               rm_lid *num, double (**box)[6])
+/* The boxes of the faces of num giants of a mesh. Not collective. */
+static remap_status list_faces(rm_arena *scratch, const rm_mesh *mesh, int64_t num, const rm_lid *giant, rm_lid *num_faces,
+                               double (**box)[6])
 {
-  int64_t most = 0, n = 0;
+  int64_t n = 0;
 
-  for (int listing = 0; listing < 2; listing++) {
-    if (listing) RM_NEW(*box, scratch, most);
-    for (rm_lid g = 0; g < giants->num; g++) {
-      const rm_lid c = giants->giant[g].cell;
-
-      if (giants->giant[g].side != (int)mesh->side || giants->giant[g].home_rank != comm->rank) continue;
-      if (!listing) most += mesh->cell_face_offset[c + 1] - mesh->cell_face_offset[c];
-      for (int64_t i = mesh->cell_face_offset[c]; listing && i < mesh->cell_face_offset[c + 1]; i++)
-        box_of_face(mesh, mesh->cell_face[i], (*box)[n++]);
-    }
-  }
+  for (int64_t g = 0; g < num; g++) n += mesh->cell_face_offset[giant[g] + 1] - mesh->cell_face_offset[giant[g]];
   RM_REQUIRE(n <= INT32_MAX, REMAP_TOO_LARGE);
-  *num = (rm_lid)n;
+  RM_NEW(*box, scratch, n);
+  *num_faces = 0;
+  for (int64_t g = 0; g < num; g++)
+    for (int64_t i = mesh->cell_face_offset[giant[g]]; i < mesh->cell_face_offset[giant[g] + 1]; i++)
+      box_of_face(mesh, mesh->cell_face[i], (*box)[(*num_faces)++]);
   return REMAP_OK;
 }
 
@@ -251,17 +245,20 @@ typedef struct faces {
   const rm_boxtree *tree;
 } faces;
 
-static remap_status bring_faces(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_tags *tags,
-                                const rm_giants *giants, faces *out)
+static remap_status bring_faces(rm_arena *scratch, const rm_comm *comm, const rm_mesh *mesh, const rm_tags *tags, faces *out)
 {
-  int64_t     *offset  = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
-  int64_t     *arrived = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *arrived), num;
-  double     (*own)[6] = NULL, (*dealt)[6] = NULL;
-  rm_lid       num_own = 0;
-  void        *recv;
-  rm_crowds    crowds;
-  remap_status status = offset && arrived ? list_faces(scratch, comm, mesh, giants, &num_own, &own) : REMAP_NO_MEMORY;
+  int64_t      *offset  = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *offset);
+  int64_t      *arrived = rm_arena_alloc(scratch, (int64_t)comm->size + 1, sizeof *arrived), num;
+  double      (*own)[6] = NULL, (*dealt)[6] = NULL;
+  int64_t       num_giants;
+  const rm_lid *giant;
+  rm_lid        num_own = 0;
+  void         *recv;
+  rm_crowds     crowds;
+  remap_status  status;
 
+  RM_TRY(rm_part_giants_at_home(scratch, comm, tags, (int)mesh->side, &num_giants, &giant));
+  status = offset && arrived ? list_faces(scratch, mesh, num_giants, giant, &num_own, &own) : REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
   RM_TRY(rm_part_crowds(scratch, comm, tags, 1 - (int)mesh->side, num_own, (const double(*)[6])own, RM_ALL_CROWDS, &crowds));
   status = deal_faces(scratch, comm, num_own, (const double(*)[6])own, &crowds, offset, &dealt);
@@ -319,8 +316,8 @@ remap_status rm_part_weigh(rm_arena *arena, rm_arena *scratch, const rm_comm *co
   if (status == REMAP_OK && !(work[0] && work[1])) status = REMAP_NO_MEMORY;
   RM_TRY(rm_comm_agree(comm, status, NULL));
   weigh_targets(tags, &s, work[REMAP_TARGET]);
-  for (int side = 0; side < 2 && giants->num > 0; side++) {
-    RM_TRY(bring_faces(scratch, comm, mesh[1 - side], tags, giants, &of_giants));
+  for (int side = 0; side < 2 && giants->num_everywhere > 0; side++) {
+    RM_TRY(bring_faces(scratch, comm, mesh[1 - side], tags, &of_giants));
     add_giants(tags, side, *giants, &of_giants, work[side]);
   }
   return REMAP_OK;

@@ -7,10 +7,10 @@
  *     level 1   [ 0 1 | 2 3 ]           rank 1 and rank 3 of a quarter,
  *     level 2   [ 0 | 1 ]               rank 0 and rank 1 of themselves: from the lowest level up.
  *
- * Then crowds go down: on each level a rank hands to its partner what meets the partner's block, its own crowds and those that
- * came so far, and keeps what meets its own. A crowd so comes on one path to each rank that it may meet, and what a rank holds
+ * Then boxes go down, crowds or others: on each level a rank hands to its partner what meets the partner's block, its own and
+ * those that came so far, and keeps what meets its own. A box so comes on one path to each rank that it may meet, and what is
  * on the way is shared evenly within a block. In a block of odd size the last rank of the smaller half has two partners, of
- * which the second gives and gets no crowds: it has no counterpart.
+ * which the second gives and gets nothing: it has no counterpart.
  *
  * O(n log RM_CROWDS) time for n boxes, 2 log2 P messages, mostly. */
 #include "zone/zone.h"
@@ -32,9 +32,11 @@ typedef struct meeting {
   int            num_with[MOST_LEVELS], with[MOST_LEVELS][2]; /* [level] partners                          */
   region         own[MOST_LEVELS + 1];  /* [level] of the block halved there, from 1; at last of this rank   */
   region         other[MOST_LEVELS];    /* [level] of the half that this rank is not in                      */
+  size_t         size;                  /* of an item: a box and more                                        */
+  rm_lid         most;                  /* items of other ranks; RM_ALL_CROWDS: any, else these are crowds   */
   int64_t        num_own, num;
-  rm_crowd      *own_crowd;             /* [num_own]                                                         */
-  rm_crowd      *crowd;                 /* [num] of other ranks                                              */
+  const char    *own_item;              /* [num_own][size]                                                   */
+  char          *item;                  /* [num][size] of other ranks                                        */
   remap_status   failed;                /* what this rank failed in: it goes on with less, for others wait   */
 } meeting;
 
@@ -109,68 +111,20 @@ static remap_status climb(meeting *m)
   return REMAP_OK;
 }
 
-/* ---- crowds ------------------------------------------------------------------------------------------------------- */
+/* ---- what goes there ---------------------------------------------------------------------------------------------- */
 
-/* Add crowds of boxes that have one label. */
-static remap_status add_crowds(meeting *m, rm_lid n, const double (*box)[6], int64_t label, int most)
-{
-  double (*around)[6];
-  int    num = 0;
-
-  RM_NEW(around, m->scratch, most);
-  RM_TRY(rm_box_groups(m->scratch, n, box, most, around, NULL, &num));
-  for (int g = 0; g < num; g++) {
-    rm_crowd *c = &m->own_crowd[m->num_own++];
-
-    *c = (rm_crowd){.num = (double)n / num, .rank = m->comm->rank, .label = label};
-    memcpy(c->box, around[g], sizeof *around);
-  }
-  return REMAP_OK;
-}
-
-/* This rank's crowds, label by label, each with its share of RM_CROWDS. */
-static remap_status make_labelled(meeting *m, rm_lid n, const double (*box)[6], const rm_lid *label)
-{
-  rm_keyed *keyed, *spare;
-  double  (*sorted)[6];
-  int       num_labels = 0;
-
-  RM_NEW(keyed, m->scratch, n);
-  RM_NEW(spare, m->scratch, n);
-  RM_NEW(sorted, m->scratch, n);
-  for (rm_lid k = 0; k < n; k++) keyed[k] = (rm_keyed){(uint64_t)label[k], k};
-  rm_sort_keyed(keyed, spare, n);
-  for (rm_lid k = 0; k < n; k++) {
-    memcpy(sorted[k], box[keyed[k].item], sizeof *sorted);
-    num_labels += k == 0 || keyed[k].key != keyed[k - 1].key;
-  }
-  const int share = num_labels > 0 && RM_CROWDS / num_labels > 1 ? RM_CROWDS / num_labels : 1;
-
-  RM_NEW(m->own_crowd, m->scratch, (int64_t)num_labels * share);
-  for (rm_lid k = 0, end; k < n; k = end) {
-    for (end = k + 1; end < n && keyed[end].key == keyed[k].key;) end++;
-    RM_TRY(add_crowds(m, end - k, (const double(*)[6])(sorted + k), (int64_t)keyed[k].key, share));
-  }
-  return REMAP_OK;
-}
-
-static remap_status make_crowds(meeting *m, rm_lid n, const double (*box)[6], const rm_lid *label)
-{
-  if (label) return make_labelled(m, n, box, label);
-  RM_NEW(m->own_crowd, m->scratch, RM_CROWDS);
-  return add_crowds(m, n, box, 0, RM_CROWDS);
-}
-
-/* Copy the crowds that meet a region; returns their number. */
-static int64_t take(const region *r, int64_t n, const rm_crowd *crowd, rm_crowd *out)
+/* Copy the items that meet a region; returns their number. */
+static int64_t take(const meeting *m, const region *r, int64_t n, const char *item, char *out)
 {
   int64_t num = 0;
 
-  for (int64_t k = 0; k < n; k++) {
+  for (int64_t k = 0; k < n; k++, item += m->size) {
+    double  box[6];
     int64_t i = 0;
 
-    while (i < r->num && !rm_box_meets(crowd[k].box, r->box[i])) i++;
-    if (i < r->num) out[num++] = crowd[k];
+    memcpy(box, item, sizeof box);
+    while (i < r->num && !rm_box_meets(box, r->box[i])) i++;
+    if (i < r->num) memcpy(out + (size_t)num++ * m->size, item, m->size);
   }
   return num;
 }
@@ -187,83 +141,180 @@ static remap_status boxes_of(rm_arena *arena, int64_t n, const rm_crowd *crowd, 
   return REMAP_OK;
 }
 
-/* Join the crowds of other ranks to `most`. */
-static remap_status join(meeting *m, rm_lid most)
+/* Join the crowds of other ranks to no more than there may be. */
+static remap_status join(meeting *m)
 {
-  const double (*box)[6];
-  double       (*around)[6];
-  rm_lid        *group_of;
-  rm_crowd      *joined;
-  int            num;
+  const rm_crowd *crowd = (const rm_crowd *)(const void *)m->item;
+  const double  (*box)[6];
+  double        (*around)[6];
+  rm_lid         *group_of;
+  rm_crowd       *joined;
+  int             num;
 
-  RM_TRY(boxes_of(m->scratch, m->num, m->crowd, &box));
-  RM_NEW(around, m->scratch, most);
+  RM_ASSERT(m->size == sizeof *crowd);
+  RM_TRY(boxes_of(m->scratch, m->num, crowd, &box));
+  RM_NEW(around, m->scratch, m->most);
   RM_NEW(group_of, m->scratch, m->num);
-  RM_TRY(rm_box_groups(m->scratch, (rm_lid)m->num, box, most, around, group_of, &num));
+  RM_TRY(rm_box_groups(m->scratch, (rm_lid)m->num, box, m->most, around, group_of, &num));
   RM_NEW0(joined, m->scratch, num);
   for (int64_t k = 0; k < m->num; k++) {
     rm_crowd *to = &joined[group_of[k]];
 
-    to->label = to->num > 0 && to->label != m->crowd[k].label ? RM_SEVERAL_LABELS : m->crowd[k].label;
-    to->rank  = m->crowd[k].rank;
-    to->num += m->crowd[k].num;
+    to->label = to->num > 0 && to->label != crowd[k].label ? RM_SEVERAL_LABELS : crowd[k].label;
+    to->rank  = crowd[k].rank;
+    to->num += crowd[k].num;
   }
   for (int g = 0; g < num; g++) memcpy(joined[g].box, around[g], sizeof *around);
-  m->num   = num;
-  m->crowd = joined;
+  m->num  = num;
+  m->item = (char *)joined;
   return REMAP_OK;
 }
 
-/* What stays of the crowds of other ranks, and what came. */
-static remap_status keep(meeting *m, const region *own, const int64_t num_came[2], void *const came[2], rm_lid most)
+/* What stays of the items of other ranks, and what came. */
+static remap_status keep(meeting *m, const region *own, const int64_t num_came[2], void *const came[2])
 {
-  rm_crowd *kept;
-  int64_t   num;
+  const int64_t most = m->num + num_came[0] + num_came[1];
+  char         *kept = rm_arena_alloc(m->scratch, most, m->size);
+  int64_t       num;
 
-  RM_NEW(kept, m->scratch, m->num + num_came[0] + num_came[1]);
-  num = take(own, m->num, m->crowd, kept);
+  if (!kept) return REMAP_NO_MEMORY;
+  num = take(m, own, m->num, m->item, kept);
   for (int k = 0; k < 2; k++) {
-    if (num_came[k] > 0) memcpy(kept + num, came[k], (size_t)num_came[k] * sizeof *kept);
+    if (num_came[k] > 0) memcpy(kept + (size_t)num * m->size, came[k], (size_t)num_came[k] * m->size);
     num += num_came[k];
   }
-  m->num   = num;
-  m->crowd = kept;
-  return num > most ? join(m, most) : REMAP_OK;
+  m->num  = num;
+  m->item = kept;
+  return num > m->most ? join(m) : REMAP_OK;
 }
 
-/* Hand crowds on, from the highest level down. */
-static remap_status descend(meeting *m, rm_lid most)
+/* Hand items on, from the highest level down. */
+static remap_status descend(meeting *m)
 {
   for (int level = 0; level < m->num_levels; level++) {
-    rm_crowd *out = rm_arena_alloc(m->scratch, m->num_own + m->num, sizeof *out);
-    int64_t   num = 0, num_came[2] = {0, 0};
-    void     *came[2] = {NULL, NULL};
+    char   *out = rm_arena_alloc(m->scratch, m->num_own + m->num, m->size);
+    int64_t num = 0, num_came[2] = {0, 0};
+    void   *came[2] = {NULL, NULL};
 
     if (out) {
-      num = take(&m->other[level], m->num_own, m->own_crowd, out);
-      num += take(&m->other[level], m->num, m->crowd, out + num);
+      num = take(m, &m->other[level], m->num_own, m->own_item, out);
+      num += take(m, &m->other[level], m->num, m->item, out + (size_t)num * m->size);
     } else {
       m->failed = REMAP_NO_MEMORY;
     }
     for (int k = 0; k < m->num_with[level]; k++)
-      RM_TRY(go_on(m, rm_comm_swap(m->comm, m->scratch, m->with[level][k], sizeof *out, k == 0 ? num : 0, out, &num_came[k],
+      RM_TRY(go_on(m, rm_comm_swap(m->comm, m->scratch, m->with[level][k], m->size, k == 0 ? num : 0, out, &num_came[k],
                                    &came[k])));
-    RM_TRY(go_on(m, keep(m, &m->own[level + 1], num_came, came, most)));
+    RM_TRY(go_on(m, keep(m, &m->own[level + 1], num_came, came)));
   }
   return m->failed;
 }
 
-/* The crowds of this rank, then those of others. Not collective. */
-static remap_status put_out(rm_arena *arena, const meeting *m, rm_crowds *out)
+/* This rank's items, then what it meets of others. Not collective. */
+static remap_status put_out(rm_arena *arena, const meeting *m, int64_t *num, void **out)
 {
-  const int64_t num = m->num_own + m->num;
-  rm_crowd     *crowd;
+  char *all = rm_arena_alloc(arena, m->num_own + m->num, m->size);
 
+  if (!all) return REMAP_NO_MEMORY;
+  if (m->num_own > 0) memcpy(all, m->own_item, (size_t)m->num_own * m->size);
+  if (m->num > 0) memcpy(all + (size_t)m->num_own * m->size, m->item, (size_t)m->num * m->size);
+  *num = m->num_own + m->num;
+  *out = all;
+  return REMAP_OK;
+}
+
+/* All of it, for own items that m has if mine is OK. Collective; the status is this rank's own. */
+static remap_status meet(rm_arena *arena, meeting *m, remap_status mine, rm_lid num_asking, const double (*asking)[6],
+                         int64_t *num, void **out)
+{
+  remap_status status;
+
+  m->scratch = rm_arena_new();
+  halve(m);
+  if (mine == REMAP_OK && !m->scratch) mine = REMAP_NO_MEMORY;
+  if (mine == REMAP_OK && m->num_levels > 0) mine = group(m->scratch, num_asking, asking, &m->own[m->num_levels]);
+  RM_GOTO(done, status = rm_comm_agree(m->comm, mine, NULL));
+  RM_GOTO(done, status = climb(m));
+  RM_GOTO(done, status = descend(m));
+  status = put_out(arena, m, num, out);
+done:
+  rm_arena_drop(m->scratch);
+  return status;
+}
+
+remap_status rm_boxes_meet(rm_arena *arena, const rm_comm *comm, size_t size, int64_t num, const void *item,
+                           rm_lid num_asking, const double (*asking)[6], int64_t *num_met, void **met)
+{
+  meeting m = {.comm = comm, .size = size, .most = RM_ALL_CROWDS, .num_own = num, .own_item = item};
+
+  return rm_comm_agree(comm, meet(arena, &m, REMAP_OK, num_asking, asking, num_met, met), NULL);
+}
+
+/* ---- crowds ------------------------------------------------------------------------------------------------------- */
+
+/* This rank's crowds. */
+typedef struct making {
+  rm_arena *scratch;
+  int       rank;
+  int64_t   num;
+  rm_crowd *crowd; /* [num] */
+} making;
+
+/* Add crowds of boxes that have one label. */
+static remap_status add_crowds(making *m, rm_lid n, const double (*box)[6], int64_t label, int most)
+{
+  double (*around)[6];
+  int    num = 0;
+
+  RM_NEW(around, m->scratch, most);
+  RM_TRY(rm_box_groups(m->scratch, n, box, most, around, NULL, &num));
+  for (int g = 0; g < num; g++) {
+    rm_crowd *c = &m->crowd[m->num++];
+
+    *c = (rm_crowd){.num = (double)n / num, .rank = m->rank, .label = label};
+    memcpy(c->box, around[g], sizeof *around);
+  }
+  return REMAP_OK;
+}
+
+/* Crowds label by label, each with its share of RM_CROWDS. */
+static remap_status make_labelled(making *m, rm_lid n, const double (*box)[6], const rm_lid *label)
+{
+  rm_keyed *keyed, *spare;
+  double  (*sorted)[6];
+  int       num_labels = 0;
+
+  RM_NEW(keyed, m->scratch, n);
+  RM_NEW(spare, m->scratch, n);
+  RM_NEW(sorted, m->scratch, n);
+  for (rm_lid k = 0; k < n; k++) keyed[k] = (rm_keyed){(uint64_t)label[k], k};
+  rm_sort_keyed(keyed, spare, n);
+  for (rm_lid k = 0; k < n; k++) {
+    memcpy(sorted[k], box[keyed[k].item], sizeof *sorted);
+    num_labels += k == 0 || keyed[k].key != keyed[k - 1].key;
+  }
+  const int share = num_labels > 0 && RM_CROWDS / num_labels > 1 ? RM_CROWDS / num_labels : 1;
+
+  RM_NEW(m->crowd, m->scratch, (int64_t)num_labels * share);
+  for (rm_lid k = 0, end; k < n; k = end) {
+    for (end = k + 1; end < n && keyed[end].key == keyed[k].key;) end++;
+    RM_TRY(add_crowds(m, end - k, (const double(*)[6])(sorted + k), (int64_t)keyed[k].key, share));
+  }
+  return REMAP_OK;
+}
+
+static remap_status make_crowds(making *m, rm_lid n, const double (*box)[6], const rm_lid *label)
+{
+  if (label) return make_labelled(m, n, box, label);
+  RM_NEW(m->crowd, m->scratch, RM_CROWDS);
+  return add_crowds(m, n, box, 0, RM_CROWDS);
+}
+
+/* The tree over what this rank knows of. Not collective. */
+static remap_status plant(rm_arena *arena, int64_t num_own, int64_t num, const rm_crowd *crowd, rm_crowds *out)
+{
   RM_REQUIRE(num <= INT32_MAX, REMAP_TOO_LARGE);
-  RM_NEW(crowd, arena, num);
-  if (m->num_own > 0) memcpy(crowd, m->own_crowd, (size_t)m->num_own * sizeof *crowd);
-  if (m->num > 0) memcpy(crowd + m->num_own, m->crowd, (size_t)m->num * sizeof *crowd);
-  *out = (rm_crowds){.num = (rm_lid)num, .num_own = (rm_lid)m->num_own, .crowd = crowd};
+  *out = (rm_crowds){.num = (rm_lid)num, .num_own = (rm_lid)num_own, .crowd = crowd};
   RM_TRY(boxes_of(arena, num, crowd, &out->box));
   return rm_boxtree_build(arena, out->num, out->box, &out->tree);
 }
@@ -278,18 +329,16 @@ remap_status rm_crowds_meet_labelled(rm_arena *arena, const rm_comm *comm, rm_li
                                      const rm_lid *label, rm_lid num_asking, const double (*asking)[6], rm_lid most,
                                      rm_crowds *out)
 {
-  meeting      m    = {.scratch = rm_arena_new(), .comm = comm, .failed = REMAP_OK};
-  remap_status mine = m.scratch ? make_crowds(&m, num_boxes, box, label) : REMAP_NO_MEMORY, status;
+  making       own  = {.scratch = rm_arena_new(), .rank = comm->rank};
+  meeting      m    = {.comm = comm, .size = sizeof *own.crowd, .most = most};
+  int64_t      num  = 0;
+  void        *all  = NULL;
+  remap_status mine = own.scratch ? make_crowds(&own, num_boxes, box, label) : REMAP_NO_MEMORY;
 
-  halve(&m);
-  if (mine == REMAP_OK && comm->size > 1) mine = group(m.scratch, num_asking, asking, &m.own[m.num_levels]);
-  RM_GOTO(done, status = rm_comm_agree(comm, mine, NULL));
-  RM_ASSERT(mine == REMAP_OK);
-  RM_GOTO(done, status = climb(&m));
-  mine = descend(&m, most);
-  if (mine == REMAP_OK) mine = put_out(arena, &m, out);
-  status = rm_comm_agree(comm, mine, NULL);
-done:
-  rm_arena_drop(m.scratch);
-  return status;
+  m.num_own  = own.num;
+  m.own_item = (const char *)own.crowd;
+  mine       = meet(arena, &m, mine, num_asking, asking, &num, &all);
+  if (mine == REMAP_OK) mine = plant(arena, own.num, num, all, out);
+  rm_arena_drop(own.scratch);
+  return rm_comm_agree(comm, mine, NULL);
 }

@@ -62,10 +62,14 @@ typedef struct rm_crowds {
  * RM_SOME_CROWDS, however many ranks and whatever lies on them; otherwise of RM_ALL_CROWDS. */
 enum { RM_CROWDS = 64, RM_SOME_CROWDS = 4096, RM_ALL_CROWDS = INT32_MAX };
 
-/* Group the boxes that every rank has, and tell each rank which crowds its asking boxes may meet: all that they meet, with
- * others. Neighbouring crowds of other ranks are joined so that no more than `most` are left, though one may then span what
- * asks nothing. Collective; messages to log2 P ranks, and what a rank takes in follows from what it asks for and not from how
- * many ranks there are. *out lives in arena. TOO_LARGE if a rank cannot number them. */
+/* Items of `size` bytes that begin with their box, double[6]: tell each rank of all those that meet its asking boxes, and of a
+ * few others. Its own come first, all of them. Collective; messages to log2 P ranks, and what a rank takes in follows from what
+ * it asks for and not from how many ranks there are. *met, [*num_met], lives in arena. */
+remap_status rm_boxes_meet(rm_arena *arena, const rm_comm *comm, size_t size, int64_t num, const void *item,
+                           rm_lid num_asking, const double (*asking)[6], int64_t *num_met, void **met);
+
+/* The same of crowds, into which the boxes of every rank are grouped. Neighbouring crowds of other ranks are joined so that no
+ * more than `most` are left. Collective. *out lives in arena. TOO_LARGE if a rank cannot number them. */
 remap_status rm_crowds_meet(rm_arena *arena, const rm_comm *comm, rm_lid num_boxes, const double (*box)[6], rm_lid num_asking,
                             const double (*asking)[6], rm_lid most, rm_crowds *out);
 
