@@ -49,13 +49,14 @@ static void print_operand(FILE *out, char letter, const bool_operand *o)
   if (!o->is_surface) {
     const rcgns_info *info = rcgns_get_info(o->file);
 
-    fprintf(out, "%lld zones, %lld cells, %d boundaries\n", (long long)info->num_zones, (long long)info->num_cells,
-            o->boundaries.num);
+    fprintf(out, "%lld zone%s, %lld cell%s, %d boundar%s\n", (long long)info->num_zones, cli_plural(info->num_zones),
+            (long long)info->num_cells, cli_plural(info->num_cells), o->boundaries.num, o->boundaries.num == 1 ? "y" : "ies");
     for (int64_t i = 0; i < info->num_notes; i++) fprintf(out, "   note: %s\n", info->note[i]);
     return;
   }
-  fprintf(out, "a surface of %lld shells, %lld of them voids; %d groups\n", (long long)o->repairs.shells,
-          (long long)o->repairs.voids, o->boundaries.num);
+  fprintf(out, "a surface of %lld shell%s, %lld of them void%s; %d group%s\n", (long long)o->repairs.shells,
+          cli_plural(o->repairs.shells), (long long)o->repairs.voids, cli_plural(o->repairs.voids), o->boundaries.num,
+          cli_plural(o->boundaries.num));
   if (o->repairs.faces_dropped || o->repairs.faces_turned || o->repairs.faces_cut || o->repairs.faces_flipped)
     fprintf(out,
             "   repaired: %lld faces turned round, %lld without size dropped, %lld without area flipped, %lld bent or concave "
@@ -66,7 +67,8 @@ static void print_operand(FILE *out, char letter, const bool_operand *o)
 
 void bool_report_print(FILE *out, const bool_report *r)
 {
-  fprintf(out, "remap-boolean %s, %d ranks: %s\n", remap_version(), r->ranks, r->options->operation);
+  fprintf(out, "remap-boolean %s on %d rank%s: %s\n", remap_version(), r->ranks, cli_plural(r->ranks),
+          r->options->operation);
   for (int side = 0; side < 2; side++) print_operand(out, (char)('A' + side), &r->operand[side]);
   fprintf(out, "\n%-10s %12s %20s\n", "result", "cells", "volume");
   for (int k = 0; k < 3; k++) fprintf(out, "%-10s %12lld %20.12g\n", kind_word[k], (long long)r->cells[k], r->volume[k]);

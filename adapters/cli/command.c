@@ -62,6 +62,10 @@ cli_exit cli_agree_on(MPI_Comm comm, cli_exit mine, cli_failure *why)
   return (cli_exit)ra_agree(comm, (int)mine, why->text, sizeof why->text);
 }
 
+/* ---- figures of reports -------------------------------------------------------------------------------------------- */
+
+const char *cli_plural(int64_t count) { return count == 1 ? "" : "s"; }
+
 double cli_slowest(MPI_Comm comm, double since)
 {
   double seconds = MPI_Wtime() - since;

@@ -83,6 +83,9 @@ cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side,
 /** Give them back; harmless on none. Not collective. */
 void cli_boundaries_drop(cli_boundaries *boundaries);
 
+/** "" or "s", for a count of things. Not collective. */
+const char *cli_plural(int64_t count);
+
 /** Seconds since then, of the slowest rank. Collective. */
 double cli_slowest(MPI_Comm comm, double since);
 

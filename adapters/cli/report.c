@@ -27,18 +27,16 @@ static const char *cell_words(const rcgns_info *info, int64_t cell, char *text, 
 
 /* ---- text --------------------------------------------------------------------------------------------------------- */
 
-static const char *plural(int64_t count) { return count == 1 ? "" : "s"; }
-
 void cli_report_meshes(FILE *out, const cli_report *report, int verbose)
 {
-  fprintf(out, "remap %s on %d rank%s\n", remap_version(), report->stats.ranks, plural(report->stats.ranks));
+  fprintf(out, "remap %s on %d rank%s\n", remap_version(), report->stats.ranks, cli_plural(report->stats.ranks));
   for (int side = 0; side < 2; side++) {
     const rcgns_info *info = report->info[side];
 
     fprintf(out, "%s  %s  %s", side_word[side], info->path, info->format);
     if (info->version > 0) fprintf(out, " %g", info->version);
-    fprintf(out, ", %lld zone%s, %lld cell%s\n", (long long)info->num_zones, plural(info->num_zones),
-            (long long)info->num_cells, plural(info->num_cells));
+    fprintf(out, ", %lld zone%s, %lld cell%s\n", (long long)info->num_zones, cli_plural(info->num_zones),
+            (long long)info->num_cells, cli_plural(info->num_cells));
     for (int64_t z = 0; verbose && z < info->num_zones; z++)
       fprintf(out, "        %-32s %s, %lld cells\n", info->zone[z].name, info->zone[z].is_structured ? "block" : "elements",
               (long long)info->zone[z].num_cells);
@@ -61,7 +59,7 @@ void cli_report_overlap(FILE *out, const cli_report *report)
     char          cell[256];
 
     if (n > 0)
-      fprintf(out, "%s: %lld inverted cell%s, the worst is %s\n", side_word[side], (long long)n, plural(n),
+      fprintf(out, "%s: %lld inverted cell%s, the worst is %s\n", side_word[side], (long long)n, cli_plural(n),
               cell_words(report->info[side], stats->worst_inverted_cell[side], cell, sizeof cell));
   }
   fflush(out);
@@ -106,18 +104,18 @@ void cli_report_cover(FILE *out, const cli_report *report)
 
     if (report->mask[side])
       fprintf(out, "%s: mask %s: %lld cell%s of volume %.6g take no part\n", side_word[side], report->mask[side],
-              (long long)cover->cells[REMAP_UNWANTED], plural(cover->cells[REMAP_UNWANTED]), cover->volume[REMAP_UNWANTED]);
+              (long long)cover->cells[REMAP_UNWANTED], cli_plural(cover->cells[REMAP_UNWANTED]), cover->volume[REMAP_UNWANTED]);
     if (side == REMAP_SOURCE) continue; /* what TARGET leaves out of SOURCE lacks nobody */
     if (cover->num_partial)
       fprintf(out, "%s: %lld cell%s of volume %.6g covered in part\n", side_word[side], (long long)cover->cells[REMAP_PARTIAL],
-              plural(cover->cells[REMAP_PARTIAL]), cover->volume[REMAP_PARTIAL]);
+              cli_plural(cover->cells[REMAP_PARTIAL]), cover->volume[REMAP_PARTIAL]);
     for (int i = 0; i < cover->num_partial; i++) print_bare(out, report->info[side], "least", &cover->partial[i]);
     if (cover->num_too_little)
       fprintf(out, "%s: %lld of these count as not covered (--min-coverage)\n", side_word[side],
               (long long)cover->num_too_little);
     if (cover->num_uncovered)
       fprintf(out, "%s: %lld cell%s of volume %.6g not covered\n", side_word[side], (long long)cover->cells[REMAP_UNCOVERED],
-              plural(cover->cells[REMAP_UNCOVERED]), cover->volume[REMAP_UNCOVERED]);
+              cli_plural(cover->cells[REMAP_UNCOVERED]), cover->volume[REMAP_UNCOVERED]);
     for (int i = 0; i < cover->num_uncovered; i++) print_bare(out, report->info[side], "largest", &cover->uncovered[i]);
   }
   fflush(out);
