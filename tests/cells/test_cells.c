@@ -1,5 +1,6 @@
 /* The supermesh of small meshes: closed cells, volumes against the moments, faces against the faces they came from,
  * conformity. */
+#include "spaced.h"
 #include "super.h"
 
 /* Both triangulations, both ways round; the meshes are given up. */
@@ -18,82 +19,61 @@ static void agrees(tm_mesh *a, tm_mesh *b, int odd_cells)
 
 /* ---- boxes ------------------------------------------------------------------------------------------------------- */
 
-typedef struct spacing {
-  int    n;
-  double x[6];
-} spacing;
-typedef struct placing {
-  const spacing *axis[3];
-  tm_map         then;
-} placing;
-
-static void place(double xyz[3], const void *data)
-{
-  const placing *p = data;
-
-  for (int c = 0; c < 3; c++) xyz[c] = p->axis[c]->x[lrint(xyz[c] * p->axis[c]->n)];
-  if (p->then) p->then(xyz, NULL);
-}
-static tm_mesh *boxes(const spacing *x, const spacing *y, const spacing *z, tm_map then)
-{
-  return tm_hexahedra((int[]){x->n, y->n, z->n}, place, &(placing){{x, y, z}, then});
-}
-static void warp(double xyz[3], const void *data)
-{
-  const long x = lrint(xyz[0]), y = lrint(xyz[1]), z = lrint(xyz[2]);
-
-  (void)data;
-  xyz[0] += (double)((7 * y + 3 * z) % 11 - 5);
-  xyz[1] += (double)((5 * x + 2 * z) % 7 - 3);
-  xyz[2] += (double)((3 * x + 5 * y) % 13 - 6);
-}
-static void to_axis(double xyz[3], const void *data)
-{
-  (void)data;
-  xyz[0] *= xyz[2];
-  xyz[1] *= xyz[2];
-}
-static void widen(double xyz[3], const void *data)
-{
-  (void)data;
-  xyz[0] *= 40;
-  xyz[1] *= 40;
-}
-
-static const spacing one = {1, {0, 120}}, two = {2, {0, 60, 120}}, three = {3, {0, 40, 80, 120}},
+static const sp_axis one = {1, {0, 120}}, two = {2, {0, 60, 120}}, three = {3, {0, 40, 80, 120}},
                      four = {4, {0, 30, 60, 90, 120}};
-static const spacing wide = {3, {0, 60, 120, 180}}, one_wide = {1, {0, 180}}, shifted = {2, {30, 90, 150}};
-static const spacing beside = {2, {120, 180, 240}}, corner = {1, {120, 180}}, flat = {3, {0, 60, 60, 120}};
-static const spacing inner = {1, {40, 80}}, inner_two = {2, {40, 50, 80}}, around = {2, {-10, 70, 130}};
+static const sp_axis wide = {3, {0, 60, 120, 180}}, one_wide = {1, {0, 180}}, shifted = {2, {30, 90, 150}};
+static const sp_axis beside = {2, {120, 180, 240}}, corner = {1, {120, 180}}, flat = {3, {0, 60, 60, 120}};
+static const sp_axis inner = {1, {40, 80}}, inner_two = {2, {40, 50, 80}}, around = {2, {-10, 70, 130}};
 
-static void identical_boxes(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&two, &two, &two, NULL), 0); }
-static void identical_warped_boxes(void) { agrees(boxes(&two, &two, &two, warp), boxes(&two, &two, &two, warp), 0); }
-static void children_in_their_parents(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&four, &four, &four, NULL), 0); }
+static void identical_boxes(void) { agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&two, &two, &two, NULL), 0); }
+static void identical_warped_boxes(void)
+{
+  agrees(sp_boxes(&two, &two, &two, sp_warp), sp_boxes(&two, &two, &two, sp_warp), 0);
+}
+static void children_in_their_parents(void)
+{
+  agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&four, &four, &four, NULL), 0);
+}
 static void a_box_around_all(void)
 {
-  agrees(boxes(&wide, &wide, &wide, NULL), boxes(&one_wide, &one_wide, &one_wide, NULL), 0);
+  agrees(sp_boxes(&wide, &wide, &wide, NULL), sp_boxes(&one_wide, &one_wide, &one_wide, NULL), 0);
 }
-static void two_against_three(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&three, &three, &three, NULL), 0); }
-static void boxes_shifted_by_half(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&shifted, &shifted, &shifted, NULL), 0); }
-static void boxes_that_abut(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&beside, &two, &two, NULL), 0); }
-static void boxes_that_abut_askew(void) { agrees(boxes(&two, &two, &two, NULL), boxes(&beside, &shifted, &three, NULL), 0); }
+static void two_against_three(void) { agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&three, &three, &three, NULL), 0); }
+static void boxes_shifted_by_half(void)
+{
+  agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&shifted, &shifted, &shifted, NULL), 0);
+}
+static void boxes_that_abut(void) { agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&beside, &two, &two, NULL), 0); }
+static void boxes_that_abut_askew(void)
+{
+  agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&beside, &shifted, &three, NULL), 0);
+}
 static void boxes_that_touch_in_a_vertex(void)
 {
-  agrees(boxes(&two, &two, &two, NULL), boxes(&corner, &corner, &corner, NULL), 0);
+  agrees(sp_boxes(&two, &two, &two, NULL), sp_boxes(&corner, &corner, &corner, NULL), 0);
 }
-static void warped_boxes_on_straight_ones(void) { agrees(boxes(&two, &two, &two, warp), boxes(&two, &two, &two, NULL), -1); }
-static void a_singular_axis(void) { agrees(boxes(&two, &two, &two, to_axis), boxes(&two, &two, &two, widen), -1); }
-static void a_layer_without_thickness(void) { agrees(boxes(&flat, &two, &two, NULL), boxes(&two, &two, &two, NULL), 0); }
-static void two_layers_without_thickness(void) { agrees(boxes(&flat, &flat, &two, NULL), boxes(&flat, &flat, &two, NULL), 0); }
-static void a_box_within_a_box(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &inner, NULL), 1); }
-static void a_box_through_a_face(void) { agrees(boxes(&one, &one, &one, NULL), boxes(&inner, &inner, &around, NULL), 1); }
+static void warped_boxes_on_straight_ones(void)
+{
+  agrees(sp_boxes(&two, &two, &two, sp_warp), sp_boxes(&two, &two, &two, NULL), -1);
+}
+static void a_singular_axis(void) { agrees(sp_boxes(&two, &two, &two, sp_to_axis), sp_boxes(&two, &two, &two, sp_widen), -1); }
+static void a_layer_without_thickness(void) { agrees(sp_boxes(&flat, &two, &two, NULL), sp_boxes(&two, &two, &two, NULL), 0); }
+static void two_layers_without_thickness(void)
+{
+  agrees(sp_boxes(&flat, &flat, &two, NULL), sp_boxes(&flat, &flat, &two, NULL), 0);
+}
+static void a_box_within_a_box(void)
+{
+  agrees(sp_boxes(&one, &one, &one, NULL), sp_boxes(&inner_two, &inner, &inner, NULL), 1);
+}
+static void a_box_through_a_face(void) { agrees(sp_boxes(&one, &one, &one, NULL), sp_boxes(&inner, &inner, &around, NULL), 1); }
 static void a_box_on_a_face_from_inside(void)
 {
-  agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &two, NULL), 1);
+  agrees(sp_boxes(&one, &one, &one, NULL), sp_boxes(&inner_two, &inner, &two, NULL), 1);
 }
 static void a_box_on_a_face_from_outside(void)
 {
-  agrees(boxes(&one, &one, &one, NULL), boxes(&inner_two, &inner, &beside, NULL), 0);
+  agrees(sp_boxes(&one, &one, &one, NULL), sp_boxes(&inner_two, &inner, &beside, NULL), 0);
 }
 
 /* ---- meshes in general position ---------------------------------------------------------------------------------- */
@@ -168,10 +148,10 @@ static amount amount_of(const tm_mesh *a, const tm_mesh *b, int keep)
 /* Each of the five by itself: what is in both, what is in one, one with the other's cuts in it, the union. */
 static void operations_add_up(void)
 {
-  const tm_warping w = {0.03, 0.7};
-  tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
-                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
-                         {tm_tetrahedra((int[]){3, 2, 2}, tm_warp, &w), tm_hexahedra((int[]){2, 2, 2}, NULL, NULL)}};
+  const tm_warping w          = {0.03, 0.7};
+  tm_mesh         *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
+                                 {sp_boxes(&two, &three, &two, NULL), sp_boxes(&shifted, &two, &four, NULL)},
+                                 {tm_tetrahedra((int[]){3, 2, 2}, tm_warp, &w), tm_hexahedra((int[]){2, 2, 2}, NULL, NULL)}};
 
   for (int k = 0; k < 3; k++) {
     amount v[5];
@@ -190,7 +170,7 @@ static void operations_add_up(void)
 /* The faces of a mesh may be quadrangles, so the union has as many cells, faces and vertices as the mesh. */
 static void identical_operands_are_their_union_and_leave_no_difference(void)
 {
-  tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&two, &three, &four, NULL);
+  tm_mesh *a = sp_boxes(&two, &three, &four, NULL), *b = sp_boxes(&two, &three, &four, NULL);
   super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   if (RT_EQ(s.status, REMAP_OK)) {
@@ -207,7 +187,7 @@ static void identical_operands_are_their_union_and_leave_no_difference(void)
 
 static void operands_with_one_skin_leave_no_difference(void)
 {
-  tm_mesh *a = boxes(&two, &three, &four, NULL), *b = boxes(&three, &two, &one, NULL);
+  tm_mesh *a = sp_boxes(&two, &three, &four, NULL), *b = sp_boxes(&three, &two, &one, NULL);
 
   RT_EQ(amount_of(a, b, REMAP_IN_SOURCE).cells, 0);
   RT_EQ(amount_of(a, b, REMAP_IN_TARGET).cells, 0);
@@ -218,8 +198,8 @@ static void operands_with_one_skin_leave_no_difference(void)
 
 static void abutting_operands_share_faces_and_no_volume(void)
 {
-  tm_mesh *a = boxes(&two, &two, &two, NULL), *b = boxes(&beside, &two, &two, NULL);
-  super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
+  tm_mesh *a = sp_boxes(&two, &two, &two, NULL), *b = sp_boxes(&beside, &two, &two, NULL);
+  super    s      = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
   int      shared = 0;
 
   RT_EQ(amount_of(a, b, REMAP_IN_BOTH).cells, 0);
@@ -240,7 +220,7 @@ static void abutting_operands_share_faces_and_no_volume(void)
 /* Eight children of one parent, whose outer faces are those of the children. */
 static void nested_operands_are_the_finer_one(void)
 {
-  tm_mesh *a = boxes(&one, &one, &one, NULL), *b = boxes(&two, &two, &two, NULL);
+  tm_mesh *a = sp_boxes(&one, &one, &one, NULL), *b = sp_boxes(&two, &two, &two, NULL);
   super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   if (RT_EQ(s.status, REMAP_OK)) {
@@ -256,8 +236,8 @@ static void nested_operands_are_the_finer_one(void)
 /* A slab through a box leaves two parts of it. */
 static void components_of_a_pair_are_cells_of_their_own(void)
 {
-  static const spacing low = {1, {0, 90}}, slab = {1, {60, 80}}, across = {1, {-10, 100}};
-  tm_mesh *a = boxes(&low, &one, &low, NULL), *b = boxes(&across, &slab, &across, NULL);
+  static const sp_axis low = {1, {0, 90}}, slab = {1, {60, 80}}, across = {1, {-10, 100}};
+  tm_mesh             *a = sp_boxes(&low, &one, &low, NULL), *b = sp_boxes(&across, &slab, &across, NULL);
 
   RT_EQ(amount_of(a, b, REMAP_IN_SOURCE).cells, 2);
   RT_EQ(amount_of(a, b, REMAP_IN_BOTH).cells, 1);
@@ -269,9 +249,9 @@ static void components_of_a_pair_are_cells_of_their_own(void)
 /* Two boxes apart within one: three shells, two of them voids. */
 static void a_cell_may_have_several_voids(void)
 {
-  static const spacing big = {1, {0, 160}}, three_of_them = {3, {20, 40, 80, 100}}, small = {1, {20, 40}};
-  tm_mesh *a = boxes(&big, &big, &big, NULL), *b = boxes(&three_of_them, &small, &small, NULL);
-  uint8_t  keep[3] = {1, 0, 1};
+  static const sp_axis big = {1, {0, 160}}, three_of_them = {3, {20, 40, 80, 100}}, small = {1, {20, 40}};
+  tm_mesh             *a = sp_boxes(&big, &big, &big, NULL), *b = sp_boxes(&three_of_them, &small, &small, NULL);
+  uint8_t              keep[3] = {1, 0, 1};
 
   for (int way = 0; way < 2; way++) {
     const laid_how how = {.keep = {way ? keep : NULL, way ? NULL : keep}};
@@ -287,13 +267,13 @@ static void a_cell_may_have_several_voids(void)
 /* A void in one of the two parts that a slab leaves of a cell belongs to that part. */
 static void a_void_belongs_to_the_part_around_it(void)
 {
-  static const spacing big = {1, {0, 160}}, layers = {3, {20, 40, 80, 100}}, wide_around = {3, {-20, 60, 80, 180}};
-  tm_mesh *a = boxes(&big, &big, &big, NULL), *b = boxes(&layers, &wide_around, &wide_around, NULL);
-  uint8_t  keep[27] = {0};
-  int      voids    = 0;
+  static const sp_axis big = {1, {0, 160}}, layers = {3, {20, 40, 80, 100}}, wide_around = {3, {-20, 60, 80, 180}};
+  tm_mesh             *a = sp_boxes(&big, &big, &big, NULL), *b = sp_boxes(&layers, &wide_around, &wide_around, NULL);
+  uint8_t              keep[27] = {0};
+  int                  voids    = 0;
 
   for (int k = 0; k < 9; k++) keep[3 * k + 2] = 1; /* the slab between 80 and 100 */
-  keep[3 * 4]      = 1;                            /* a box within what is below */
+  keep[3 * 4]        = 1;                          /* a box within what is below */
   const laid_how how = {.keep = {NULL, keep}};
   super          s   = super_of(a, b, REMAP_FACES_CENTRE, &how, SUPER_UNION);
   super_check(&s, 1, true);
@@ -318,10 +298,10 @@ static void flatten(double xyz[3], const void *data)
 }
 static double cross_plate(int n, bool check)
 {
-  const int   g = 2 * n + 1;
-  tm_mesh    *plate = tm_hexahedra((int[]){1, 1, 1}, flatten, NULL), *grid = tm_hexahedra((int[]){g, g, 1}, NULL, NULL);
-  uint8_t    *keep  = tm_alloc_((int64_t)g * g, 1);
-  double      least = INFINITY;
+  const int g     = 2 * n + 1;
+  tm_mesh  *plate = tm_hexahedra((int[]){1, 1, 1}, flatten, NULL), *grid = tm_hexahedra((int[]){g, g, 1}, NULL, NULL);
+  uint8_t  *keep  = tm_alloc_((int64_t)g * g, 1);
+  double    least = INFINITY;
 
   for (int j = 1; j < g; j += 2)
     for (int i = 1; i < g; i += 2) keep[j * g + i] = 1;
@@ -348,7 +328,7 @@ static void faces_may_have_many_holes(void)
 
 static void cells_that_overlap_are_refused(void)
 {
-  tm_mesh *a = tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -0.25, NULL, NULL), *b = boxes(&one, &one, &one, NULL);
+  tm_mesh *a = tm_two_zones((int[]){2, 2, 2}, (int[]){2, 2, 2}, -0.25, NULL, NULL), *b = sp_boxes(&one, &one, &one, NULL);
   super    s = super_of(a, b, REMAP_FACES_CENTRE, NULL, SUPER_UNION);
 
   RT_EQ(s.status, REMAP_BAD_MESH);
@@ -374,7 +354,7 @@ static void faces_without_area_are_left_out(void)
   agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL), tm_hexahedra((int[]){4, 4, 4}, NULL, NULL), 0);
   agrees(tm_refined((int[]){2, 2, 2}, tm_right_half, squash, NULL), tm_refined((int[]){2, 2, 2}, tm_checkered, squash, NULL),
          -1);
-  agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, to_axis, NULL), tm_tetrahedra((int[]){2, 2, 2}, NULL, NULL), -1);
+  agrees(tm_refined((int[]){2, 2, 2}, tm_checkered, sp_to_axis, NULL), tm_tetrahedra((int[]){2, 2, 2}, NULL, NULL), -1);
   agrees(tm_refined((int[]){4, 2, 2}, tm_checkered, to_edge, NULL), tm_hexahedra((int[]){3, 2, 3}, NULL, NULL), -1);
 }
 
@@ -403,7 +383,7 @@ static void compare(const super *s, const super *t)
 static void numbering_and_senders_change_no_bit(void)
 {
   tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
-                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
+                         {sp_boxes(&two, &three, &two, NULL), sp_boxes(&shifted, &two, &four, NULL)},
                          {tm_dual((int[]){2, 2, 2}, NULL, NULL), tm_mixed((int[]){5, 2, 1}, NULL, NULL)}};
 
   for (int k = 0; k < 3; k++) {
@@ -431,8 +411,8 @@ static int by_coordinates(const void *a, const void *b)
 static void which_mesh_is_the_source_moves_no_vertex(void)
 {
   tm_mesh *pair[3][2] = {{tm_benchmark(4, 0.7, 0.3, 0.8), tm_benchmark(3, 0.1, 0, 1)},
-                         {boxes(&two, &three, &two, NULL), boxes(&shifted, &two, &four, NULL)},
-                         {boxes(&two, &two, &two, warp), boxes(&three, &two, &three, NULL)}};
+                         {sp_boxes(&two, &three, &two, NULL), sp_boxes(&shifted, &two, &four, NULL)},
+                         {sp_boxes(&two, &two, &two, sp_warp), sp_boxes(&three, &two, &three, NULL)}};
 
   for (int k = 0; k < 3; k++) {
     super s = super_of(pair[k][0], pair[k][1], REMAP_FACES_CENTRE, NULL, SUPER_UNION);
@@ -453,10 +433,10 @@ static void which_mesh_is_the_source_moves_no_vertex(void)
 
 static void memory_that_runs_out_is_told(void)
 {
-  tm_mesh     *a = boxes(&two, &two, &two, NULL), *b = boxes(&shifted, &two, &four, NULL);
-  laid        *l = laid_over(a, b, REMAP_FACES_CENTRE, NULL);
-  remap_status status = REMAP_NO_MEMORY;
-  int64_t      n      = 0;
+  tm_mesh          *a = sp_boxes(&two, &two, &two, NULL), *b = sp_boxes(&shifted, &two, &four, NULL);
+  laid             *l      = laid_over(a, b, REMAP_FACES_CENTRE, NULL);
+  remap_status      status = REMAP_NO_MEMORY;
+  int64_t           n      = 0;
   const rm_trimesh *mesh[2];
   const rm_overlay *o = NULL;
 

@@ -40,27 +40,16 @@ static tm_mesh *cubes(int x, int y, int z, bool turned)
 /* Two cells in a row, each a prism along x, over a polygon in the plane x = 0; what lies between them is one face. */
 static tm_mesh *two_prisms(int n, const double (*polygon)[2])
 {
-  tm_builder_ b = {.num_cells = 2};
-  int64_t     loop[16], *id;
-  tm_mesh    *mesh;
+  tm_mesh *mesh = tm_column(n, 2);
 
-  for (int k = 0; k < 2; k++) {
-    for (int h = 0; h < n; h++) loop[h] = (int64_t)k * n + (n - 1 - h);
-    tm_face_(&b, k, n, loop);
-    for (int h = 0; h < n; h++) loop[h] = (int64_t)(k + 1) * n + h;
-    tm_face_(&b, k, n, loop);
-    for (int h = 0; h < n; h++) {
-      const int64_t p = (int64_t)k * n + h, q = (int64_t)k * n + (h + 1) % n;
-      tm_face_(&b, k, 4, (int64_t[]){p, q, q + n, p + n});
-    }
-  }
-  mesh = tm_finish_(&b, 3 * (int64_t)n, &id);
   for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
-    mesh->xyz[3 * v]     = 64 * (double)(id[v] / n) - 64;
-    mesh->xyz[3 * v + 1] = polygon[id[v] % n][0];
-    mesh->xyz[3 * v + 2] = polygon[id[v] % n][1];
+    double   *x  = mesh->xyz + 3 * v;
+    const int at = (int)lrint(x[0]);
+
+    x[0] = 64 * x[1] - 64;
+    x[1] = polygon[at][0];
+    x[2] = polygon[at][1];
   }
-  free(id);
   return mesh;
 }
 #define PRISMS(polygon) two_prisms((int)(sizeof(polygon) / sizeof *(polygon)), polygon)

@@ -4,6 +4,7 @@
 #include "meshes.h"
 #include "rough.h"
 #include "rt.h"
+#include "views.h"
 
 enum { UNION = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET };
 
@@ -101,21 +102,6 @@ static void is_a_mesh(const remap_supermesh_view *v)
   free(list), free(used);
 }
 
-/* Twice the area vector of a face. */
-static void area_vector(const remap_supermesh_view *v, int64_t f, double out[3])
-{
-  const int32_t *node = v->face_node + v->face_offset[f];
-  const double  *o    = v->node_xyz + 3 * (int64_t)node[0];
-
-  out[0] = out[1] = out[2] = 0;
-  for (int64_t k = 1; k + 1 < v->face_offset[f + 1] - v->face_offset[f]; k++) {
-    double a[3], b[3];
-    for (int c = 0; c < 3; c++)
-      a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
-    for (int c = 0; c < 3; c++) out[c] += a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-  }
-}
-
 /* Volumes of cells by the cones of their faces from a node of each. */
 static double *volumes_by_faces(const remap_supermesh_view *v)
 {
@@ -125,7 +111,7 @@ static double *volumes_by_faces(const remap_supermesh_view *v)
   for (int64_t c = 0; c < v->num_cells; c++) origin[c] = -1;
   for (int64_t f = 0; f < v->num_faces; f++) {
     const int32_t cell[2] = {v->face_owner[f], v->face_neighbour[f]}, first = v->face_node[v->face_offset[f]];
-    area_vector(v, f, a);
+    view_area_vector(v, f, a);
     for (int h = 0; h < 2; h++) {
       if (cell[h] < 0) continue;
       if (origin[cell[h]] < 0) origin[cell[h]] = first;
@@ -399,7 +385,7 @@ static void is_convex(const remap_supermesh_view *v)
     const int64_t n = v->face_offset[f + 1] - v->face_offset[f];
     double        a[3];
 
-    area_vector(v, f, a);
+    view_area_vector(v, f, a);
     for (int64_t k = 0; k < n; k++) {
       const double *x[3];
       double        u[3], w[3], turn = 0, size = 0;

@@ -5,6 +5,7 @@
 #include "meshes.h"
 #include "rt.h"
 #include "surfaces.h"
+#include "views.h"
 
 enum { UNION = REMAP_IN_BOTH | REMAP_IN_SOURCE | REMAP_IN_TARGET };
 
@@ -42,21 +43,6 @@ static void drop(result *r)
   for (int side = 0; side < 2; side++) tm_free(r->mine[side]);
 }
 
-/* Twice the area vector of a face. */
-static void area_vector(const remap_supermesh_view *v, int64_t f, double out[3])
-{
-  const int32_t *node = v->face_node + v->face_offset[f];
-  const double  *o    = v->node_xyz + 3 * (int64_t)node[0];
-
-  out[0] = out[1] = out[2] = 0;
-  for (int64_t k = 1; k + 1 < v->face_offset[f + 1] - v->face_offset[f]; k++) {
-    double a[3], b[3];
-    for (int c = 0; c < 3; c++)
-      a[c] = v->node_xyz[3 * (int64_t)node[k] + c] - o[c], b[c] = v->node_xyz[3 * (int64_t)node[k + 1] + c] - o[c];
-    for (int c = 0; c < 3; c++) out[c] += a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-  }
-}
-
 /* What the boundary of the result encloses: faces with one cell. One rank. */
 static double enclosed(const remap_supermesh_view *v)
 {
@@ -65,7 +51,7 @@ static double enclosed(const remap_supermesh_view *v)
   for (int64_t f = 0; f < v->num_faces; f++) {
     if (v->face_neighbour[f] >= 0) continue;
     const double *p = v->node_xyz + 3 * (int64_t)v->face_node[v->face_offset[f]];
-    area_vector(v, f, a);
+    view_area_vector(v, f, a);
     for (int c = 0; c < 3; c++) sum += a[c] * p[c] / 6;
   }
   return sum;
@@ -78,7 +64,7 @@ static void has_no_flat_face(const remap_supermesh_view *v)
   double  a[3];
 
   for (int64_t f = 0; f < v->num_faces; f++) {
-    area_vector(v, f, a);
+    view_area_vector(v, f, a);
     flat += a[0] * a[0] + a[1] * a[1] + a[2] * a[2] < 1e-20;
   }
   RT_EQ(flat, 0);
@@ -201,7 +187,7 @@ static void a_body_is_cut_from_a_grid(void)
     for (int64_t f = 0, next = 0; f < r.v.num_faces; f++) {
       const bool beyond = next < r.v.num_beyond && r.v.beyond_face[next] == f;
       next += beyond;
-      area_vector(&r.v, f, a);
+      view_area_vector(&r.v, f, a);
       RT_EQ(tagged[f], r.v.face_from[1][f] >= 0 ? 7 : -1);
       if (tagged[f] == 7) sum[1] += .5 * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
       else if (r.v.face_neighbour[f] < 0 && !beyond) sum[2] += .5 * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);

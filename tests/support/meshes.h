@@ -75,6 +75,34 @@ static inline tm_mesh *tm_pyramids(const int n[3], tm_map map, const void *data)
   return tm_boxes_(n, TM_PYRAMIDS_, map, data);
 }
 
+/* Cells one behind the other, each a prism over the same polygon of n corners, counter-clockwise seen against the direction in
+ * which they follow. Corner h of layer k is at (h, k, 0): the caller moves the nodes. */
+static inline tm_mesh *tm_column(int n, int layers)
+{
+  tm_builder_ b    = {.num_cells = layers};
+  int64_t    *loop = tm_alloc_(n, sizeof *loop), *id;
+  tm_mesh    *mesh;
+
+  for (int k = 0; k < layers; k++) {
+    for (int h = 0; h < n; h++) loop[h] = (int64_t)k * n + (n - 1 - h);
+    tm_face_(&b, k, n, loop);
+    for (int h = 0; h < n; h++) loop[h] = (int64_t)(k + 1) * n + h;
+    tm_face_(&b, k, n, loop);
+    for (int h = 0; h < n; h++) {
+      const int64_t p = (int64_t)k * n + h, q = (int64_t)k * n + (h + 1) % n;
+      tm_face_(&b, k, 4, (int64_t[]){p, q, q + n, p + n});
+    }
+  }
+  mesh = tm_finish_(&b, (int64_t)(layers + 1) * n, &id);
+  for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
+    mesh->xyz[3 * v]     = (double)(id[v] % n);
+    mesh->xyz[3 * v + 1] = (double)(id[v] / n);
+  }
+  free(loop);
+  free(id);
+  return mesh;
+}
+
 /* Hexahedra, prisms, pyramids and tetrahedra side by side along x, conformal; all four where n[0] >= 5. */
 static inline tm_mesh *tm_mixed(const int n[3], tm_map map, const void *data) { return tm_boxes_(n, TM_MIXED_, map, data); }
 

@@ -553,4 +553,17 @@ static inline void oracle_check(const laid *l, oracle_demand demand)
   oracle_free(o);
 }
 
+/* Lay one mesh over the other and compare: both triangulations, both ways round. The meshes are given up. */
+static inline void oracle_agrees(tm_mesh *a, tm_mesh *b)
+{
+  for (int way = 0; way < 4; way++) {
+    laid *l = laid_over(way & 1 ? b : a, way & 1 ? a : b, way & 2 ? REMAP_FACES_DIAGONAL : REMAP_FACES_CENTRE, NULL);
+
+    if (RT_EQ(l->status, REMAP_OK)) oracle_check(l, ORACLE_EXACT);
+    laid_free(l);
+  }
+  tm_free(a);
+  tm_free(b);
+}
+
 #endif
