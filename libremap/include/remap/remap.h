@@ -418,8 +418,9 @@ REMAP_API remap_status remap_set_mesh(remap_context *ctx, remap_side side, const
  *  Errors: BAD_ARGUMENT, NO_MEMORY. */
 REMAP_API remap_status remap_set_blocks(remap_context *ctx, remap_side side, int num_blocks, const remap_mesh *block);
 
-/** Overlay the two meshes. Collective. Errors: BAD_ORDER (a mesh is missing on this or another rank), BAD_MESH,
- *  ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY, MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
+/** Overlay the two meshes. Collective. Nodes are read where they were lent last, by a remap_move too, but without its matrix.
+ *  Errors: BAD_ORDER (a mesh is missing on this or another rank), BAD_MESH, ZONE_OVERLAP, CANCELLED, TOO_LARGE, NO_MEMORY,
+ *  MPI_FAILURE, INCONSISTENT; remap_message tells which cell. */
 REMAP_API remap_status remap_build(remap_context *ctx);
 
 /** Overlay the meshes in a new position. Collective, after remap_build; motion is [side]. The result is the same, bit by

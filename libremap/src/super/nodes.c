@@ -96,7 +96,7 @@ static uint32_t word_of_vertex(const void *user, int64_t i, int k)
   const rm_made_of *m = &v->made_of[i];
 
   if (k == 0) return (uint32_t)v->place[m->first];
-  if (k == 1) return m->kind << 30 | corner_of(v, m->second);
+  if (k == 1) return (uint32_t)m->kind << 30 | corner_of(v, m->second);
   return corner_of(v, m->more[k - 2]);
 }
 
