@@ -2,47 +2,50 @@
  * stay, cells stay closed. */
 #include "super.h"
 
+#include <time.h>
+
 enum { MAX_POINTS = 12 };
 
-/* A prism of n points around the z axis, at these distances and thousandths of a turn: one cell, 0 <= z <= 1. */
-static tm_mesh *star(int n, const double *radius, const int *turn)
+/* A prism over the polygon of n points, counter-clockwise: one cell, 0 <= z <= 1. */
+static tm_mesh *prism(int n, const double (*xy)[2])
 {
-  tm_builder_ b = {.num_cells = 1};
-  int64_t    *id;
+  tm_builder_ b    = {.num_cells = 1};
+  int64_t    *id, *node = tm_alloc_(n > 4 ? n : 4, sizeof *node);
   tm_mesh    *mesh;
 
   for (int f = 0; f < n + 2; f++) { /* below, above, then the sides */
-    int64_t node[MAX_POINTS] = {f - 2, (f - 1) % n, n + (f - 1) % n, n + f - 2};
+    const int64_t side[4] = {f - 2, (f - 1) % n, n + (f - 1) % n, n + f - 2};
 
+    memcpy(node, side, sizeof side);
     for (int k = 0; k < n && f < 2; k++) node[k] = f ? n + k : n - 1 - k;
     tm_face_(&b, 0, f < 2 ? n : 4, node);
   }
   mesh = tm_finish_(&b, 2 * n, &id);
   for (int64_t v = 0; v < mesh->view.num_nodes; v++) {
-    const double angle = 2 * M_PI * turn[id[v] % n] / 1000;
-
-    mesh->xyz[3 * v]     = rint(64 * radius[id[v] % n] * cos(angle)) / 64;
-    mesh->xyz[3 * v + 1] = rint(64 * radius[id[v] % n] * sin(angle)) / 64;
+    memcpy(mesh->xyz + 3 * v, xy[id[v] % n], sizeof *xy);
     mesh->xyz[3 * v + 2] = id[v] < n ? 0 : 1;
   }
-  free(id);
+  free(id), free(node);
   return mesh;
 }
 
+/* Points around the z axis, those at odd places nearer to it. */
 static tm_mesh *star_of(uint64_t seed)
 {
-  double radius[MAX_POINTS];
-  int    turn[MAX_POINTS];
+  double xy[MAX_POINTS][2];
 
   for (int k = 0; k < MAX_POINTS; k++) {
-    radius[k] = k % 2 ? .5 + .05 * (double)tm_random(&seed, 10) : 1.5 + .1 * (double)tm_random(&seed, 10);
-    turn[k]   = 1000 * k / MAX_POINTS + (int)tm_random(&seed, 30);
+    const double radius = k % 2 ? .5 + .05 * (double)tm_random(&seed, 10) : 1.5 + .1 * (double)tm_random(&seed, 10);
+    const double angle  = 2 * M_PI * (1000 * k / MAX_POINTS + (int)tm_random(&seed, 30)) / 1000;
+
+    xy[k][0] = rint(64 * radius * cos(angle)) / 64;
+    xy[k][1] = rint(64 * radius * sin(angle)) / 64;
   }
-  return star(MAX_POINTS, radius, turn);
+  return prism(MAX_POINTS, (const double (*)[2])xy);
 }
 
-/* The cells with concave faces cut; *whole those without. */
-static super split(const tm_mesh *a, const tm_mesh *b, remap_faces faces, const rm_cells **whole)
+/* The cells with concave faces cut; *whole those without; *seconds of processor time for the former. */
+static super split(const tm_mesh *a, const tm_mesh *b, remap_faces faces, const rm_cells **whole, double *seconds)
 {
   const rm_cells_choice choice = {.keep = SUPER_UNION, .split_concave = true};
   super                 s      = super_of(a, b, faces, NULL, SUPER_UNION);
@@ -51,7 +54,9 @@ static super split(const tm_mesh *a, const tm_mesh *b, remap_faces faces, const 
   *whole = s.cells;
   if (!RT_EQ(s.status, REMAP_OK)) return s;
   RT_EQ(rm_overlay_build(s.l->arena, s.mesh, &s.l->part, NULL, &o, &s.l->reason), REMAP_OK);
-  s.status = rm_cells_build(s.l->arena, &s.l->part, o, NULL, &choice, &s.cells, &s.l->reason);
+  const clock_t start = clock();
+  s.status            = rm_cells_build(s.l->arena, &s.l->part, o, NULL, &choice, &s.cells, &s.l->reason);
+  *seconds            = (double)(clock() - start) / CLOCKS_PER_SEC;
   RT_EQ(s.status, REMAP_OK);
   return s;
 }
@@ -124,10 +129,11 @@ static void whole_faces_are_cut_along_their_triangles(void)
   for (uint64_t seed = 1; seed <= 20; seed++) {
     tm_mesh        *a = star_of(seed), *b = tm_hexahedra((int[]){1, 1, 1}, NULL, NULL);
     const rm_cells *whole;
+    double          seconds;
     super           s;
 
     tm_move(b, tm_affine, away);
-    s = split(a, b, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, &whole);
+    s = split(a, b, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, &whole, &seconds);
     if (s.status == REMAP_OK) {
       RT_CHECK(s.cells->num_faces > whole->num_faces);
       RT_EQ(turns_back(s.cells), 0);
@@ -149,10 +155,11 @@ static void pieces_of_faces_are_convex_too(void)
     tm_mesh        *a = star_of(seed);
     tm_mesh        *b = seed % 3 ? star_of(seed + 100) : tm_refined((int[]){2, 2, 2}, tm_checkered, NULL, NULL);
     const rm_cells *whole;
+    double          seconds;
     super           s;
 
     tm_move(b, tm_affine, over);
-    s = split(a, b, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, &whole);
+    s = split(a, b, seed % 2 ? REMAP_FACES_CENTRE : REMAP_FACES_DIAGONAL, &whole, &seconds);
     if (s.status == REMAP_OK) {
       RT_CHECK(s.cells->num_faces > whole->num_faces);
       RT_EQ(turns_back(s.cells), 0);
@@ -165,4 +172,35 @@ static void pieces_of_faces_are_convex_too(void)
   }
 }
 
-RT_MAIN(RT_CASE(whole_faces_are_cut_along_their_triangles), RT_CASE(pieces_of_faces_are_convex_too))
+/* A comb of n teeth, of different lengths: seconds of processor time of its cells with concave faces cut, the least of three. */
+static double time_of_comb(int n)
+{
+  double (*xy)[2] = tm_alloc_(2 * n + 3, sizeof *xy), least = INFINITY;
+
+  memcpy(xy, (const double[2][2]){{0, -20}, {2 * n, -20}}, 2 * sizeof *xy);
+  for (int k = 0; k <= 2 * n; k++) xy[2 + k][0] = 2 * n - k, xy[2 + k][1] = k % 2 ? -1 - k * 7 % 11 : k * 5 % 13;
+  tm_mesh *a = prism(2 * n + 3, (const double (*)[2])xy), *b = tm_hexahedra((int[]){1, 1, 1}, NULL, NULL);
+  tm_move(b, tm_affine, (const double[12]){1, 0, 0, -9, 0, 1, 0, -9, 0, 0, 1, -9});
+  for (int k = 0; k < 3; k++) {
+    const rm_cells *whole;
+    double          seconds = INFINITY;
+    super           s       = split(a, b, REMAP_FACES_DIAGONAL, &whole, &seconds);
+
+    least = fmin(least, seconds);
+    if (s.status == REMAP_OK) RT_CHECK(s.cells->num_faces > whole->num_faces + n);
+    if (s.status == REMAP_OK && n < 200) RT_EQ(turns_back(s.cells), 0);
+    laid_free(s.l);
+  }
+  tm_free(a), tm_free(b), free(xy);
+  return least;
+}
+
+/* 16 times as many corners: 256 times the time if every cut looked at all of them. */
+static void faces_may_have_many_corners(void)
+{
+  const double few = time_of_comb(100), many = time_of_comb(1600);
+  RT_CHECK(many < 64 * few);
+}
+
+RT_MAIN(RT_CASE(whole_faces_are_cut_along_their_triangles), RT_CASE(pieces_of_faces_are_convex_too),
+        RT_CASE(faces_may_have_many_corners))
