@@ -172,7 +172,8 @@ static void pieces_of_faces_are_convex_too(void)
   }
 }
 
-/* A comb of n teeth, of different lengths: seconds of processor time of its cells with concave faces cut, the least of three. */
+/* A comb of n teeth, of different lengths: seconds of processor time for its cells with concave faces cut, the least of
+ * three. */
 static double time_of_comb(int n)
 {
   double (*xy)[2] = tm_alloc_(2 * n + 3, sizeof *xy), least = INFINITY;

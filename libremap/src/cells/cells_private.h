@@ -4,6 +4,7 @@
  *   limit.c     contacts of the two meshes, found exactly; the vertices of the supermesh; the vertices along every edge
  *   spots.c     exact signs of vertices that are no nodes of the meshes
  *   polygons.c  the planar graph in every triangle and its polygons
+ *   islands.c   parts of such a graph that lie in others' polygons
  *   holes.c     polygons with holes, cut into triangles
  *   arcs.c      edges of polygons, sorted
  *   glue.c      cells: sides of polygons joined around edges
@@ -166,6 +167,32 @@ static inline rm_label rm_polygon_label(const rm_limit *l, const rm_polygons *p,
 /* Every polygon of the supermesh. lines are the arenas of l->lines: dropped, and NULL then, one after the other. BAD_MESH with
  * cell and reason if the meshes are not embedded, TOO_LARGE from 2^30 polygons on. O(a log a) for the arcs of a triangle. */
 remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_arena *lines[2], rm_polygons *out, rm_reason *reason);
+
+/* An arc of the graph in a triangle, seen from one end; arc k has halves 2 k and 2 k + 1. */
+typedef struct rm_half {
+  rm_lid from;  /* node                                         */
+  rm_lid state; /* of the other mesh on its left, RM_UNKNOWN    */
+  rm_lid next;  /* of the walk that has its polygon on the left */
+  rm_lid cycle; /* which that walk is                           */
+} rm_half;
+typedef struct rm_cycle {
+  rm_lid half, num, state, inside; /* inside: the cycle whose hole it is, -1              */
+  rm_lid first_hole, next_hole;    /* the holes in it; the next one in the same cycle; -1 */
+  bool   simple;                   /* it has no vertex twice                              */
+} rm_cycle;
+/* Node 0 is one of the boundary's. */
+typedef struct rm_graph {
+  rm_view   view;
+  rm_lid    num_nodes, num_halves, num_cycles;
+  rm_lid   *spot;      /* [num_nodes]                */
+  rm_half  *half;      /* [num_halves]               */
+  rm_cycle *cycle;     /* [num_cycles]               */
+  rm_lid   *component; /* [num_nodes] working memory */
+} rm_graph;
+static inline rm_lid rm_end_of(const rm_graph *g, rm_lid h) { return g->half[h ^ 1].from; }
+/* Which cycles are holes of which: `inside` and the lists of holes; a hole's state becomes that of the cycle it is in, where
+ * that has none. BAD_MESH if edges cross, NO_MEMORY. */
+remap_status rm_find_holes(rm_graph *g);
 
 /* A line that sweeps over a plane graph, see sweep.c. */
 typedef struct rm_sweep {

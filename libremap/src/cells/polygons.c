@@ -15,23 +15,9 @@
 
 enum { NOT_CALLED = -1, OUTER = -2 };
 
-/* An arc seen from one end; arc k has halves 2 k and 2 k + 1. */
-typedef struct half {
-  rm_lid from;  /* node */
-  rm_lid state; /* of the other mesh on its left, RM_UNKNOWN */
-  rm_lid next;
-  rm_lid cycle;
-} half;
-
 typedef struct arc {
   rm_lid from, to, left, right; /* spots, states */
 } arc;
-
-typedef struct cycle {
-  rm_lid half, num, state, inside; /* inside: the cycle whose hole it is, -1 */
-  rm_lid first_hole, next_hole;    /* the holes in it; the next one in the same cycle; -1 */
-  bool   simple; /* it has no vertex twice */
-} cycle;
 
 typedef struct edge_spot {
   rm_lid edge, spot;
@@ -45,18 +31,15 @@ typedef struct work {
   rm_polygons    *out;
   int             side;
   rm_lid          t;
-  rm_view         view;
+  rm_graph        g;
   const rm_lid     *segment_offset; /* [num_triangles of mesh `side` + 1] */
   const rm_segment *segment;
   rm_lid         *node_of; /* [num_spots] NOT_CALLED */
-  rm_lid         *spot;    /* [num_nodes] */
-  rm_lid         *degree_offset, *around, *component;
-  half           *half;
+  rm_lid         *degree_offset, *around;
   arc            *arc;
-  cycle          *cycle;
   edge_spot      *touch;
   int64_t         spot_room, degree_room, around_room, component_room, half_room, arc_room, cycle_room, touch_room;
-  rm_lid          num_nodes, num_halves, num_boundary, num_arcs, num_cycles, num_touches;
+  rm_lid          num_boundary, num_arcs, num_touches;
 } work;
 
 static inline int other_side(const work *w) { return 1 - w->side; }
@@ -100,9 +83,9 @@ static remap_status turn_segments(work *w, rm_arena *arena)
 static remap_status node(work *w, rm_lid spot, rm_lid *out)
 {
   if (w->node_of[spot] == NOT_CALLED) {
-    RM_TRY(rm_grow(&w->spot, &w->spot_room, (int64_t)w->num_nodes + 1, sizeof *w->spot));
-    w->node_of[spot]      = w->num_nodes;
-    w->spot[w->num_nodes++] = spot;
+    RM_TRY(rm_grow(&w->g.spot, &w->spot_room, (int64_t)w->g.num_nodes + 1, sizeof *w->g.spot));
+    w->node_of[spot]      = w->g.num_nodes;
+    w->g.spot[w->g.num_nodes++] = spot;
   }
   *out = w->node_of[spot];
   return REMAP_OK;
@@ -110,14 +93,14 @@ static remap_status node(work *w, rm_lid spot, rm_lid *out)
 
 static remap_status add_arc(work *w, rm_lid from, rm_lid to, rm_lid left, rm_lid right)
 {
-  half h[2] = {{-1, left, -1, NOT_CALLED}, {-1, right, -1, right == OUTER ? OUTER : NOT_CALLED}};
+  rm_half h[2] = {{-1, left, -1, NOT_CALLED}, {-1, right, -1, right == OUTER ? OUTER : NOT_CALLED}};
 
   RM_TRY(node(w, from, &h[0].from));
   RM_TRY(node(w, to, &h[1].from));
-  if (w->num_halves + 2 > w->half_room)
-    RM_TRY(rm_grow(&w->half, &w->half_room, (int64_t)w->num_halves + 2, sizeof *w->half));
-  memcpy(w->half + w->num_halves, h, sizeof h);
-  w->num_halves += 2;
+  if (w->g.num_halves + 2 > w->half_room)
+    RM_TRY(rm_grow(&w->g.half, &w->half_room, (int64_t)w->g.num_halves + 2, sizeof *w->g.half));
+  memcpy(w->g.half + w->g.num_halves, h, sizeof h);
+  w->g.num_halves += 2;
   return REMAP_OK;
 }
 
@@ -141,7 +124,7 @@ static remap_status boundary(work *w)
       RM_TRY(h == 2 ? add_arc(w, q, p, at, OUTER) : add_arc(w, p, q, at, OUTER));
     }
   }
-  w->num_boundary = w->num_nodes;
+  w->num_boundary = w->g.num_nodes;
   return REMAP_OK;
 }
 
@@ -204,7 +187,7 @@ static remap_status edges_in_plane(work *w)
   const rm_lines *lines = &w->l->lines[w->side];
 
   w->num_touches = 0;
-  for (rm_lid k = 0; k < w->num_boundary; k++) RM_TRY(push_touch(w, w->spot[k]));
+  for (rm_lid k = 0; k < w->num_boundary; k++) RM_TRY(push_touch(w, w->g.spot[k]));
   for (rm_lid k = lines->inner_offset[w->t]; k < lines->inner_offset[w->t + 1]; k++)
     RM_TRY(push_touch(w, lines->inner_spot[k]));
   if (w->num_touches < 2) return REMAP_OK;
@@ -263,12 +246,10 @@ static remap_status inner_arcs(work *w)
 
 /* ---- walks ------------------------------------------------------------------------------------------------------- */
 
-static inline rm_lid end_of(const work *w, rm_lid h) { return w->half[h ^ 1].from; }
-
 /* True if half y follows half x, both leaving one node, within less than half a turn counter-clockwise. */
 static bool follows(const work *w, rm_lid x, rm_lid y)
 {
-  return rm_turn(&w->view, w->spot[w->half[x].from], w->spot[end_of(w, x)], w->spot[end_of(w, y)]) > 0;
+  return rm_turn(&w->g.view, w->g.spot[w->g.half[x].from], w->g.spot[rm_end_of(&w->g, x)], w->g.spot[rm_end_of(&w->g, y)]) > 0;
 }
 
 /* Order the halves that leave a node of the boundary counter-clockwise. It has two halves of the boundary, which come first:
@@ -290,14 +271,14 @@ static void order_at_boundary(const work *w, rm_lid *list, rm_lid n)
 /* Order the halves that leave a node inside counter-clockwise, from the first of them on. */
 static void order_inside(const work *w, rm_lid *list, rm_lid n)
 {
-  const rm_lid p = w->spot[w->half[list[0]].from], reference = w->spot[end_of(w, list[0])];
+  const rm_lid p = w->g.spot[w->g.half[list[0]].from], reference = w->g.spot[rm_end_of(&w->g, list[0])];
 
   for (rm_lid i = 2; i < n; i++) {
     const rm_lid x    = list[i];
-    const int    turn = rm_turn(&w->view, p, reference, w->spot[end_of(w, x)]);
+    const int    turn = rm_turn(&w->g.view, p, reference, w->g.spot[rm_end_of(&w->g, x)]);
     rm_lid       k    = i;
     while (k > 1) {
-      const int other = rm_turn(&w->view, p, reference, w->spot[end_of(w, list[k - 1])]);
+      const int other = rm_turn(&w->g.view, p, reference, w->g.spot[rm_end_of(&w->g, list[k - 1])]);
       if (turn == other ? !follows(w, x, list[k - 1]) : turn < other) break; /* left, straight back, right */
       list[k] = list[k - 1];
       k--;
@@ -310,189 +291,61 @@ static remap_status link_halves(work *w)
 {
   rm_lid *offset;
 
-  RM_TRY(rm_grow(&w->degree_offset, &w->degree_room, (int64_t)w->num_nodes + 2, sizeof *w->degree_offset));
-  RM_TRY(rm_grow(&w->around, &w->around_room, w->num_halves, sizeof *w->around));
+  RM_TRY(rm_grow(&w->degree_offset, &w->degree_room, (int64_t)w->g.num_nodes + 2, sizeof *w->degree_offset));
+  RM_TRY(rm_grow(&w->around, &w->around_room, w->g.num_halves, sizeof *w->around));
   offset = w->degree_offset;
-  memset(offset, 0, sizeof *offset * ((size_t)w->num_nodes + 2));
-  for (rm_lid h = 0; h < w->num_halves; h++) offset[w->half[h].from + 2]++;
-  for (rm_lid k = 0; k < w->num_nodes; k++) offset[k + 2] += offset[k + 1];
-  for (rm_lid h = 0; h < w->num_halves; h++) w->around[offset[w->half[h].from + 1]++] = h;
-  for (rm_lid k = 0; k < w->num_nodes; k++) {
+  memset(offset, 0, sizeof *offset * ((size_t)w->g.num_nodes + 2));
+  for (rm_lid h = 0; h < w->g.num_halves; h++) offset[w->g.half[h].from + 2]++;
+  for (rm_lid k = 0; k < w->g.num_nodes; k++) offset[k + 2] += offset[k + 1];
+  for (rm_lid h = 0; h < w->g.num_halves; h++) w->around[offset[w->g.half[h].from + 1]++] = h;
+  for (rm_lid k = 0; k < w->g.num_nodes; k++) {
     rm_lid      *list = w->around + offset[k];
     const rm_lid n    = offset[k + 1] - offset[k];
     if (n > 2 && k < w->num_boundary) order_at_boundary(w, list, n);
     if (n > 2 && k >= w->num_boundary) order_inside(w, list, n);
-    for (rm_lid i = 0; i < n; i++) w->half[list[(i + 1) % n] ^ 1].next = list[i];
+    for (rm_lid i = 0; i < n; i++) w->g.half[list[(i + 1) % n] ^ 1].next = list[i];
   }
   return REMAP_OK;
-}
-
-/* Twice the area of a cycle, rounded. */
-static double cycle_area(const work *w, rm_lid first)
-{
-  const double *o = w->l->xyz[w->spot[w->half[first].from]];
-  double        area = 0;
-  rm_lid        h = first;
-
-  do {
-    const double *p = w->l->xyz[w->spot[w->half[h].from]], *q = w->l->xyz[w->spot[end_of(w, h)]];
-    const int     x = w->view.x, y = w->view.y;
-    area += (p[x] - o[x]) * (q[y] - o[y]) - (p[y] - o[y]) * (q[x] - o[x]);
-    h = w->half[h].next;
-  } while (h != first);
-  return w->view.flip * area;
 }
 
 static remap_status walk_cycles(work *w)
 {
   rm_lid *seen;
 
-  RM_TRY(rm_grow(&w->component, &w->component_room, w->num_nodes, sizeof *w->component));
-  seen = w->component;
-  for (rm_lid k = 0; k < w->num_nodes; k++) seen[k] = -1;
-  w->num_cycles = 0;
-  for (rm_lid first = 0; first < w->num_halves; first++) {
-    cycle  c = {first, 0, RM_UNKNOWN, -1, -1, -1, true};
-    rm_lid h = first;
+  RM_TRY(rm_grow(&w->g.component, &w->component_room, w->g.num_nodes, sizeof *w->g.component));
+  seen = w->g.component;
+  for (rm_lid k = 0; k < w->g.num_nodes; k++) seen[k] = -1;
+  w->g.num_cycles = 0;
+  for (rm_lid first = 0; first < w->g.num_halves; first++) {
+    rm_cycle c = {first, 0, RM_UNKNOWN, -1, -1, -1, true};
+    rm_lid   h = first;
 
-    if (w->half[first].cycle != NOT_CALLED) continue;
+    if (w->g.half[first].cycle != NOT_CALLED) continue;
     do {
-      if (w->half[h].cycle != NOT_CALLED) return tangled(w);
-      w->half[h].cycle = w->num_cycles;
-      c.simple         = c.simple && seen[w->half[h].from] != w->num_cycles;
-      seen[w->half[h].from] = w->num_cycles;
+      if (w->g.half[h].cycle != NOT_CALLED) return tangled(w);
+      w->g.half[h].cycle = w->g.num_cycles;
+      c.simple         = c.simple && seen[w->g.half[h].from] != w->g.num_cycles;
+      seen[w->g.half[h].from] = w->g.num_cycles;
       c.num++;
-      if (w->half[h].state != RM_UNKNOWN) {
-        if (c.state != RM_UNKNOWN && c.state != w->half[h].state) return tangled(w);
-        c.state = w->half[h].state;
+      if (w->g.half[h].state != RM_UNKNOWN) {
+        if (c.state != RM_UNKNOWN && c.state != w->g.half[h].state) return tangled(w);
+        c.state = w->g.half[h].state;
       }
-      h = w->half[h].next;
+      h = w->g.half[h].next;
     } while (h != first);
-    RM_TRY(rm_grow(&w->cycle, &w->cycle_room, (int64_t)w->num_cycles + 1, sizeof *w->cycle));
-    w->cycle[w->num_cycles++] = c;
+    RM_TRY(rm_grow(&w->g.cycle, &w->cycle_room, (int64_t)w->g.num_cycles + 1, sizeof *w->g.cycle));
+    w->g.cycle[w->g.num_cycles++] = c;
   }
   return REMAP_OK;
-}
-
-/* ---- parts of the graph that hang together, holes ---------------------------------------------------------------- */
-
-static rm_lid root(rm_lid *parent, rm_lid k)
-{
-  while (parent[k] != k) k = parent[k] = parent[parent[k]];
-  return k;
-}
-
-/* A part of the graph apart from the boundary. */
-typedef struct island {
-  rm_lid root;  /* node                                           */
-  rm_lid first; /* spot that a line from the left comes to first  */
-  rm_lid shore; /* the cycle around it                            */
-} island;
-
-/* The islands, in the order in which a line from the left comes to them; of[node] is the island of a root, -1. */
-static remap_status find_islands(work *w, rm_arena *arena, const rm_lid *parent, rm_lid num, island **out, rm_lid *of)
-{
-  island *list, *sorted;
-  rm_lid *first, *order;
-  double *area;
-
-  RM_NEW(list, arena, num);
-  RM_NEW(sorted, arena, num);
-  RM_NEW(first, arena, num);
-  RM_NEW(area, arena, num);
-  num = 0;
-  for (rm_lid k = 0; k < w->num_nodes; k++) {
-    of[k] = k && parent[k] == k ? num : -1;
-    if (of[k] >= 0) area[num] = INFINITY, list[num++] = (island){k, w->spot[k], -1};
-  }
-  for (rm_lid k = 0; k < w->num_nodes; k++) {
-    island *x = parent[k] ? &list[of[parent[k]]] : NULL;
-    if (x && rm_sweep_compare(&w->view, w->spot[k], x->first) < 0) x->first = w->spot[k];
-  }
-  for (rm_lid c = 0; c < w->num_cycles; c++) { /* the one that runs clockwise */
-    const rm_lid x = of[parent[w->half[w->cycle[c].half].from]];
-    const double a = x >= 0 ? cycle_area(w, w->cycle[c].half) : 0;
-    if (x >= 0 && a < area[x]) area[x] = a, list[x].shore = c;
-  }
-  for (rm_lid k = 0; k < num; k++) first[k] = list[k].first;
-  RM_TRY(rm_sweep_order(arena, &w->view, num, first, &order));
-  for (rm_lid k = 0; k < num; k++) sorted[k] = list[order[k]], of[sorted[k].root] = k;
-  *out = sorted;
-  return REMAP_OK;
-}
-
-/* The cycle above arc k. */
-static rm_lid cycle_above(const work *w, rm_lid k)
-{
-  const rm_lid h = 2 * k;
-  return w->half[rm_sweep_compare(&w->view, w->spot[w->half[h].from], w->spot[end_of(w, h)]) < 0 ? h : h + 1].cycle;
-}
-
-/* Each island is a hole of the polygon above the edge that is below its first spot; if that is another's shore, it is in the
- * same polygon. */
-static remap_status place_islands(work *w, rm_arena *arena, const island *list, rm_lid num)
-{
-  const rm_lid arcs = w->num_halves / 2;
-  rm_lid     (*edge)[2], *query, *below;
-
-  RM_NEW(edge, arena, arcs);
-  RM_NEW(query, arena, num);
-  RM_NEW(below, arena, num);
-  for (rm_lid k = 0; k < arcs; k++)
-    for (int h = 0; h < 2; h++) edge[k][h] = w->spot[w->half[2 * k + h].from];
-  for (rm_lid k = 0; k < num; k++) {
-    query[k]                        = list[k].first;
-    w->cycle[list[k].shore].inside = w->num_cycles; /* not known yet */
-  }
-  remap_status status = rm_edges_below(arena, &w->view, arcs, (const rm_lid (*)[2])edge, num, query, below);
-  if (status == REMAP_BAD_MESH) return tangled(w);
-  RM_TRY(status);
-  for (rm_lid k = 0; k < num; k++) {
-    cycle *hole   = &w->cycle[list[k].shore];
-    rm_lid around = below[k] < 0 ? -1 : cycle_above(w, below[k]);
-
-    if (around >= 0 && w->cycle[around].inside >= 0) around = w->cycle[around].inside;
-    if (around < 0 || around == w->num_cycles) return tangled(w);
-    hole->inside                = around;
-    hole->next_hole             = w->cycle[around].first_hole;
-    w->cycle[around].first_hole = list[k].shore;
-    if (w->cycle[around].state == RM_UNKNOWN) w->cycle[around].state = hole->state;
-  }
-  return REMAP_OK;
-}
-
-/* The cycle around each part of the graph apart from the boundary is a hole of the polygon that it lies in. */
-static remap_status find_holes(work *w)
-{
-  rm_lid *parent, *of, num = 0;
-  island *list;
-
-  parent = w->component;
-  for (rm_lid k = 0; k < w->num_nodes; k++) parent[k] = k;
-  for (rm_lid h = 0; h < w->num_halves; h += 2) {
-    const rm_lid a = root(parent, w->half[h].from), b = root(parent, end_of(w, h));
-    if (a < b) parent[b] = a;
-    else parent[a] = b;
-  }
-  for (rm_lid k = 1; k < w->num_nodes; k++) num += root(parent, k) == k;
-  if (!num) return REMAP_OK;
-  for (rm_lid k = 1; k < w->num_nodes; k++) parent[k] = root(parent, k);
-
-  rm_arena    *arena  = rm_arena_new();
-  remap_status status = arena && (of = rm_arena_alloc(arena, w->num_nodes, sizeof *of)) ? REMAP_OK : REMAP_NO_MEMORY;
-  if (status == REMAP_OK) status = find_islands(w, arena, parent, num, &list, of);
-  if (status == REMAP_OK) status = place_islands(w, arena, list, num);
-  rm_arena_drop(arena);
-  return status;
 }
 
 /* ---- where a polygon lies in the other mesh ---------------------------------------------------------------------- */
 
 /* Of a polygon that has no arc with a state: all its arcs lie on triangles of the other mesh. */
-static remap_status locate(work *w, const cycle *c, rm_lid *triangle, rm_lid *state)
+static remap_status locate(work *w, const rm_cycle *c, rm_lid *triangle, rm_lid *state)
 {
   const rm_trimesh *own = w->l->mesh[w->side], *other = w->l->mesh[other_side(w)];
-  const rm_lid      p = w->spot[w->half[c->half].from], q = w->spot[end_of(w, c->half)];
+  const rm_lid      p = w->g.spot[w->g.half[c->half].from], q = w->g.spot[rm_end_of(&w->g, c->half)];
   rm_lid            b, f;
 
   *triangle = -1;
@@ -548,13 +401,13 @@ static remap_status push_polygon(work *w, rm_lid b, rm_lid state)
   return REMAP_OK;
 }
 
-static remap_status push_loop(work *w, const cycle *c, rm_polygons *to)
+static remap_status push_loop(work *w, const rm_cycle *c, rm_polygons *to)
 {
   rm_lid h = c->half;
 
   do {
-    RM_TRY(push_vertex(to, w->spot[w->half[h].from]));
-    h = w->half[h].next;
+    RM_TRY(push_vertex(to, w->g.spot[w->g.half[h].from]));
+    h = w->g.half[h].next;
   } while (h != c->half);
   return REMAP_OK;
 }
@@ -565,13 +418,13 @@ static remap_status cut_loops(work *w, rm_arena *arena, rm_lid around, rm_polygo
   int64_t *offset;
   int      n = 0;
 
-  RM_NEW(offset, arena, (int64_t)w->num_cycles + 1);
-  for (rm_lid c = around; c >= 0; c = c == around ? w->cycle[c].first_hole : w->cycle[c].next_hole) {
+  RM_NEW(offset, arena, (int64_t)w->g.num_cycles + 1);
+  for (rm_lid c = around; c >= 0; c = c == around ? w->g.cycle[c].first_hole : w->g.cycle[c].next_hole) {
     offset[n++] = loops->num_vertices;
-    RM_TRY(push_loop(w, &w->cycle[c], loops));
+    RM_TRY(push_loop(w, &w->g.cycle[c], loops));
   }
   offset[n] = loops->num_vertices;
-  const remap_status status = rm_cut_holes(arena, &w->view, n, offset, loops->vertex, corner, num);
+  const remap_status status = rm_cut_holes(arena, &w->g.view, n, offset, loops->vertex, corner, num);
   return status == REMAP_BAD_MESH ? tangled(w) : status;
 }
 
@@ -597,15 +450,16 @@ static remap_status one_triangle(work *w)
 {
   remap_status status = REMAP_OK;
 
-  w->num_nodes = w->num_halves = 0;
+  w->g.num_nodes = w->g.num_halves = 0;
   RM_TRY(boundary(w));
   RM_TRY(inner_arcs(w));
-  w->view = rm_view_of(w->l, w->side, w->t);
+  w->g.view = rm_view_of(w->l, w->side, w->t);
   RM_TRY(link_halves(w));
   RM_TRY(walk_cycles(w));
-  RM_TRY(find_holes(w));
-  for (rm_lid k = 0; k < w->num_cycles && status == REMAP_OK; k++) {
-    const cycle *c = &w->cycle[k];
+  status = rm_find_holes(&w->g);
+  if (status == REMAP_BAD_MESH) return tangled(w);
+  for (rm_lid k = 0; k < w->g.num_cycles && status == REMAP_OK; k++) {
+    const rm_cycle *c = &w->g.cycle[k];
     rm_lid       b = -1, state = c->state;
 
     if (c->inside >= 0) continue;
@@ -619,7 +473,7 @@ static remap_status one_triangle(work *w)
     RM_TRY(push_loop(w, c, w->out));
     status = push_polygon(w, b, state);
   }
-  for (rm_lid k = 0; k < w->num_nodes; k++) w->node_of[w->spot[k]] = NOT_CALLED;
+  for (rm_lid k = 0; k < w->g.num_nodes; k++) w->node_of[w->g.spot[k]] = NOT_CALLED;
   return status;
 }
 
@@ -694,13 +548,13 @@ remap_status rm_polygons_build(const rm_part *part, const rm_limit *l, rm_arena 
   work         w      = {.scratch = rm_arena_new(), .part = part, .l = l, .reason = reason, .out = out};
   remap_status status = w.scratch ? all_triangles(&w, lines) : REMAP_NO_MEMORY;
 
-  free(w.spot);
+  free(w.g.spot);
   free(w.degree_offset);
   free(w.around);
-  free(w.component);
-  free(w.half);
+  free(w.g.component);
+  free(w.g.half);
   free(w.arc);
-  free(w.cycle);
+  free(w.g.cycle);
   free(w.touch);
   rm_arena_drop(w.scratch);
   rm_polygons_trim(out);
