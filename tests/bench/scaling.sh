@@ -1,10 +1,12 @@
 #!/bin/sh
-# scaling.sh -- the tables of libremap/doc/scaling.md: what bench_scaling counts on 1 to 32 ranks, and fits of it. Nothing here
-# is a time, so the machine may be busy and the ranks more than its cores.
+# scaling.sh -- the tables of libremap/doc/scaling.md: what bench_scaling counts on 1 to 32 ranks, and fits of it; on up to 128
+# ranks what every rank is told, and on up to 256 what bench_crowds counts. Nothing here is a time, so the machine may be busy
+# and the ranks more than its cores.
 #
 #   tests/bench/scaling.sh BUILD [N ...]
 #
-# BUILD is the build folder. N defaults to 12 16 20 24 32; the largest makes the table, all make the fits. Takes some minutes.
+# BUILD is the build folder. N defaults to 12 16 20 24 32; the largest makes the table, all make the fits. Takes some ten
+# minutes.
 set -eu
 build=${1:?usage: scaling.sh BUILD [N ...]}
 shift
@@ -14,11 +16,18 @@ work=$(mktemp)
 trap 'rm -f "$work"' EXIT
 [ "$(id -u)" != 0 ] || export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 
+# run RANKS PROGRAM ARGUMENTS
+run() {
+  ranks=$1 program=$2
+  shift 2
+  mpirun --oversubscribe --mca mpi_yield_when_idle 1 -n "$ranks" "$build/tests/$program" "$@"
+}
+
 for n; do
   for ranks in 1 2 4 8 16 32; do
     for dealt in "" RANDOM; do
       printf '%s ' "$n"
-      mpirun --oversubscribe --mca mpi_yield_when_idle 1 -n "$ranks" "$build/tests/bench_scaling" even "$n" $dealt
+      run "$ranks" bench_scaling even "$n" $dealt
     done
   done
 done >"$work"
@@ -30,7 +39,7 @@ fields() { tr -d '{}"' <"$work" | tr ':,' '  ' |
 echo "One rank at most, N = $largest:"
 echo
 printf '| cells dealt in | ranks | cells per rank | messages | partners | bytes sent | per cell | collectives '
-echo "| bytes into them | peak bytes | per cell | kept | field: messages | bytes |"
+echo "| bytes out of them | peak bytes | per cell | kept | field: messages | bytes |"
 echo "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"
 fields | awk -v largest="$largest" '$14 == largest { n = $3 / $2
   printf "| %s | %d | %d | %d | %d | %d | %.0f | %d | %d | %d | %.0f | %d | %d | %d |\n", $1, $2, n, $4, $6, $5, $5 / n, $7,
@@ -89,3 +98,20 @@ for dealt in slabs random; do
 done
 fit slabs 12 asked "bytes sent by remap_field" "a N^2, twice from 3 ranks on"
 fit random 12 asked "bytes sent by remap_field" "a n (P - 1) (1 - (1 - 1/P)^18)"
+
+echo
+echo "Up to 128 ranks, slabs, N = 20:"
+echo
+echo "| ranks | messages | bytes sent | collectives | bytes out of them |"
+echo "|---|---|---|---|---|"
+for ranks in 8 16 32 64 128; do run "$ranks" bench_scaling even 20; done | tr -d '{}"' | tr ':,' '  ' |
+  awk '{ printf "| %d | %d | %d | %d | %d |\n", $8, $15, $17, $21, $23 }'
+echo
+echo "bench_crowds, 512 boxes of each rank, along the curve or anywhere:"
+echo
+echo "| ranks | messages | bytes sent | crowds known | anywhere: bytes sent | crowds known | joined: bytes sent | crowds known |"
+echo "|---|---|---|---|---|---|---|---|"
+for ranks in 8 16 32 64 128 256; do
+  { run "$ranks" bench_crowds 8; run "$ranks" bench_crowds 8 RANDOM; } | tr -d '{}"' | tr ':,' '  ' | tr '\n' ' ' |
+    awk '{ printf "| %d | %d | %d | %d | %d | %d | %d | %d |\n", $6, $10, $12, $14, $33, $35, $38, $40 }'
+done

@@ -60,7 +60,7 @@ typedef struct rm_crowds {
 
 /* A rank makes no more crowds than RM_CROWDS. Where it does not matter whose they are, it learns of no more than
  * RM_SOME_CROWDS, however many ranks and whatever lies on them; otherwise of RM_ALL_CROWDS. */
-enum { RM_CROWDS = 64, RM_SOME_CROWDS = 4096, RM_ALL_CROWDS = INT32_MAX };
+enum { RM_CROWDS = 64, RM_SOME_CROWDS = 1024, RM_ALL_CROWDS = INT32_MAX };
 
 /* Items of `size` bytes that begin with their box, double[6]: tell each rank of all those that meet its asking boxes, and of a
  * few others. Its own come first, all of them. Collective; messages to log2 P ranks, and what a rank takes in follows from what
