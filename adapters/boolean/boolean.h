@@ -92,6 +92,7 @@ typedef struct bool_content {
   rslice_field  *field;  /**< content.field */
   double        *values; /**< behind them */
   cli_boundaries boundaries;
+  cli_ancestors  faces;
 } bool_content;
 
 /** Take over what the cells and faces of the operands have. A field that both have is A's in the cells of A, else B's; a cell

@@ -80,7 +80,8 @@ static cli_exit open_mesh(MPI_Comm comm, const bool_options *options, int side, 
   rcgns_message    message;
 
   rcgns_options_default(&how);
-  how.base = options->base[side];
+  how.base         = options->base[side];
+  how.face_numbers = 1;
   if (side == 1) how.scale = options->scale;
   CLI_TRY(cli_from_cgns(rcgns_open(comm, o->path, &how, &o->file, &message), &message, why));
   o->mesh      = *rcgns_mesh(o->file);
@@ -225,6 +226,13 @@ cli_exit bool_content_make(MPI_Comm comm, const bool_options *options, remap_con
   CLI_TRY(cli_boundaries_begin(comm, view->num_faces, operand[0].boundaries.num + operand[1].boundaries.num, b, why));
   for (int side = 0; side < 2; side++)
     CLI_TRY(cli_boundaries_take(comm, ctx, (remap_side)side, operand[side].mesh.num_faces, &operand[side].boundaries, b, why));
+  for (int side = 0; side < 2; side++) {
+    CLI_TRY(cli_ancestors_take(comm, ctx, (remap_side)side, &operand[side].mesh,
+                               operand[side].file ? rcgns_face_numbers(operand[side].file) : NULL, view->num_faces, &out->faces,
+                               why));
+    out->content.face_cell[side]   = out->faces.cell[side];
+    out->content.face_number[side] = out->faces.number[side];
+  }
   out->content.num_boundaries = b->num;
   out->content.boundary_name  = b->name;
   out->content.boundary_type  = b->type;
@@ -237,5 +245,6 @@ void bool_content_drop(bool_content *content)
   free(content->field);
   free(content->values);
   cli_boundaries_drop(&content->boundaries);
+  cli_ancestors_drop(&content->faces);
   *content = (bool_content){.field = NULL};
 }

@@ -78,6 +78,7 @@ typedef struct rcgns_options {
   double         scale;           /**< coordinates are multiplied by it first; default 1 */
   rcgns_location location;        /**< default RCGNS_CELLS */
   double         transform[3][4]; /**< then x' = A x + b, rows [A | b]; default: identity. A must not be singular */
+  int            face_numbers;    /**< not 0: rcgns_face_numbers will be asked for; 8 bytes per face. Default 0 */
 } rcgns_options;
 
 /** One zone with volume cells. */
@@ -176,6 +177,12 @@ const rcgns_info *rcgns_get_info(const rcgns_file *file);
  *  joined; all others have neighbour -1. cell_global, name and zones are set. Not collective. */
 const remap_mesh *rcgns_mesh(const rcgns_file *file);
 
+/** What the file calls the faces of this rank's mesh, [faces of rcgns_mesh]: element numbers of NGON_n in zones of polyhedra,
+ *  in others the number of the face in its owner, the lower cell of this rank beside it, as SIDS counts the faces of an element
+ *  from 1 (a cell of a block is a HEXA_8). Owned by the file. NULL if options.face_numbers was 0, or cells are dual ones, or
+ *  there are no faces. Not collective. */
+const int64_t *rcgns_face_numbers(const rcgns_file *file);
+
 /** The boundary conditions of a mesh; owned by the file until rcgns_close. Names and types are the same on every rank. */
 typedef struct rcgns_boundaries {
   int                num;
@@ -240,10 +247,11 @@ rcgns_status rcgns_write(rcgns_file *file, const char *path, const char *solutio
 void rcgns_close(rcgns_file **file);
 
 /** Write a supermesh to a new HDF5 file at `path`, stamped `version` (see rcgns_create): one zone "Base/Zone" of NGON_n and
- *  NFACE_n; "FaceAncestors/LiesIn" below NGON_n, the origins of rslice_faces; a BC_t with a PointList of faces for each
- *  boundary that has outer faces, its name cut to what CGNS takes; the ancestors (integers, counted from 1, 0: none), "Volume"
- *  and the fields in the CellCenter FlowSolution_t "FlowSolution#Centers". The file appears when it is complete; an existing
- *  one is replaced. The bytes do not depend on the number of ranks. Collective on comm.
+ *  NFACE_n; "FaceAncestors" below NGON_n: "LiesIn", the origins of rslice_faces, and where they are known the cells and numbers
+ *  of those faces, named like the ancestors with "Cell" and "Face" behind; a BC_t with a PointList of faces for each boundary
+ *  that has outer faces, its name cut to what CGNS takes; the ancestors (integers, counted from 1, 0: none), "Volume" and the
+ *  fields in the CellCenter FlowSolution_t "FlowSolution#Centers". The file appears when it is complete; an existing one is
+ *  replaced. The bytes do not depend on the number of ranks. Collective on comm.
  *  Errors: USAGE (a bad name, no cells), IO, GEOMETRY (the supermesh is inconsistent), MEMORY. */
 rcgns_status rcgns_write_supermesh(MPI_Comm comm, const char *path, double version, const rslice_content *content,
                                    rcgns_message *message);

@@ -240,6 +240,8 @@ typedef struct rc_mesh {
   ra_array rim_node;    /* int64_t, of polyhedra: nodes in the zone */
   ra_array xyz;         /* double[3] */
   ra_array node_number; /* int64_t, for dual cells only: node of the file, all zones */
+  ra_array face_number; /* int64_t, as in rcgns_face_numbers; empty unless they are wanted */
+  bool     wants_face_numbers;
   ra_array face_offset, face_node, face_owner, face_neighbour, cell_global; /* int64_t */
 } rc_mesh;
 
@@ -317,8 +319,8 @@ rcgns_status rc_mesh_build(rcgns_file *file, rcgns_message *message);
 /* Coordinates of nodes of an unstructured zone. Collective. xyz [n][3]; shared, if not NULL, [n]: more ranks than one ask. */
 rcgns_status rc_nodes_fetch(rcgns_file *file, rcgns_status mine, const rc_zone *zone, const int64_t *node, int64_t n,
                             double *xyz, uint8_t *shared, rcgns_message *message);
-/* One face into the mesh: a loop of local nodes, false: no memory. */
-bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour);
+/* One face into the mesh: a loop of local nodes, and what the file calls it. false: no memory. */
+bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour, int64_t number);
 /* Corners of the faces of a hexahedron, outward. */
 enum { RC_HEXA_FACES = 6, RC_HEXA_CORNERS = 8 };
 extern const int8_t rc_hexa_face[RC_HEXA_FACES][4];

@@ -228,7 +228,8 @@ static rcgns_status fill_info(rcgns_file *file, rcgns_message *message)
 
 static rcgns_status open_file(rcgns_file *file, const rcgns_options *options, rcgns_message *message)
 {
-  file->location = options->location == RCGNS_VERTICES ? "Vertex" : "CellCenter";
+  file->location                 = options->location == RCGNS_VERTICES ? "Vertex" : "CellCenter";
+  file->build.wants_face_numbers = options->face_numbers && options->location == RCGNS_CELLS;
   RC_TRY(rc_agree(file->comm, set_map(file, options, message), message));
   RC_TRY(rc_agree(file->comm, file->rank == 0 ? read_tree(file, message) : RCGNS_OK, message));
   RC_TRY(rc_tree_bcast(file->comm, &file->tree, message));
@@ -273,6 +274,11 @@ rcgns_status rcgns_open(MPI_Comm comm, const char *path, const rcgns_options *op
 const rcgns_info *rcgns_get_info(const rcgns_file *file) { return &file->info; }
 
 const remap_mesh *rcgns_mesh(const rcgns_file *file) { return &file->mesh; }
+
+const int64_t *rcgns_face_numbers(const rcgns_file *file)
+{
+  return file->build.wants_face_numbers ? file->build.face_number.item : NULL;
+}
 
 void rcgns_close(rcgns_file **address)
 {

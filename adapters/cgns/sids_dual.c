@@ -289,7 +289,7 @@ static bool gather(const dual *d, const facet *f, int64_t n, const bool *is_gone
     if (is_gone[i]) continue;
     for (int k = 0; k < 3; k++)
       if ((loop[k] = node_at(mesh, nodes, f[i].xyz[k])) < 0) return false;
-    if (!rc_face_add(mesh, loop, 3, false, f[i].vertex - d->lo, is_mine ? f[i].beyond - d->lo : -1)) return false;
+    if (!rc_face_add(mesh, loop, 3, false, f[i].vertex - d->lo, is_mine ? f[i].beyond - d->lo : -1, 0)) return false;
   }
   for (int64_t v = d->lo; v < d->hi; v++)
     if (!ra_push_int(&mesh->cell_global, v)) return false;
@@ -320,7 +320,7 @@ static rcgns_status add_loose(const dual *d, rc_mesh *mesh, const bool *has_face
       if (!ra_reserve(&mesh->xyz, 1, 3 * sizeof *xyz)) status = rc_no_memory(message);
       if (status != RCGNS_OK) break;
       memcpy((double *)mesh->xyz.item + 3 * mesh->xyz.count++, xyz + 3 * i, 3 * sizeof *xyz);
-      if (!rc_face_add(mesh, loop, 3, false, cell, -1)) status = rc_no_memory(message);
+      if (!rc_face_add(mesh, loop, 3, false, cell, -1, 0)) status = rc_no_memory(message);
     }
     free(xyz);
     ra_drop(&loose);

@@ -244,7 +244,7 @@ static bool emit(rc_mesh *mesh, const rc_zone *zone, const elements *e, int64_t 
     return emit(mesh, zone, e, first_cell, lo, side, -1) && emit(mesh, zone, e, first_cell, lo, other, -1);
   for (int i = 0; i < n; i++) loop[i] += e->base;
   if (!rc_face_add(mesh, loop, n, false, first_cell + cell[side / MAX_FACES] - lo,
-                   other < 0 ? -1 : first_cell + cell[other / MAX_FACES] - lo))
+                   other < 0 ? -1 : first_cell + cell[other / MAX_FACES] - lo, side % MAX_FACES + 1))
     return false;
   if (other >= 0) return true;
   zone_key(e, key, against);

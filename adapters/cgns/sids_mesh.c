@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour)
+bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, int64_t owner, int64_t neighbour, int64_t number)
 {
   int64_t *loop;
 
@@ -18,6 +18,7 @@ bool rc_face_add(rc_mesh *mesh, const int64_t *node, int64_t n, bool reverse, in
   loop = (int64_t *)mesh->face_node.item + mesh->face_node.count;
   for (int64_t i = 0; i < n; i++) loop[i] = node[reverse ? n - 1 - i : i];
   mesh->face_node.count += n;
+  if (mesh->wants_face_numbers && !ra_push_int(&mesh->face_number, number)) return false;
   return ra_push_int(&mesh->face_offset, mesh->face_node.count) && ra_push_int(&mesh->face_owner, owner) &&
          ra_push_int(&mesh->face_neighbour, neighbour);
 }
@@ -188,7 +189,8 @@ static bool block_faces(rc_mesh *mesh, const rc_zone *zone, const patch *p, int6
 
         loop[v] = base + ((at[2] + d[2] - p->k0) * p->rows + at[1] + d[1] - p->j0) * zone->vertices[0] + at[0] + d[0];
       }
-      if (!rc_face_add(mesh, loop, 4, false, first_cell + c - lo, other < 0 ? -1 : first_cell + other - lo)) return false;
+      if (!rc_face_add(mesh, loop, 4, false, first_cell + c - lo, other < 0 ? -1 : first_cell + other - lo, f + 1))
+        return false;
       if (index >= 0 && index < n[a]) continue;
       if (!rc_rim_add(mesh, zone, 2 * a + (step[f] > 0), at[0], at[1], at[2])) return false;
     }
@@ -383,6 +385,7 @@ void rc_mesh_drop(rc_mesh *mesh)
 {
   ra_drop(&mesh->xyz);
   ra_drop(&mesh->node_number);
+  ra_drop(&mesh->face_number);
   ra_drop(&mesh->face_offset);
   ra_drop(&mesh->face_node);
   ra_drop(&mesh->face_owner);

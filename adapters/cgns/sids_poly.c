@@ -581,15 +581,15 @@ static bool emit(rc_mesh *mesh, const rc_zone *zone, const polys *p, int64_t fir
     const int64_t  n    = ints_of(&p->loop_at)[f + 1] - ints_of(&p->loop_at)[f];
     const int64_t *loop = ints_of(&p->loop) + ints_of(&p->loop_at)[f];
     const int64_t  a = ref[2 * f], b = ref[2 * f + 1];
+    const int64_t  number = number_of(zone, ints_of(&p->faces.key)[f]);
 
     if (a < 0 || distinct(loop, n) < 3) continue;
     if (b >= 0 && sign[a] != sign[b]) {
-      ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), first_cell + cell_of(p, b));
+      ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), first_cell + cell_of(p, b), number);
       continue;
     }
-    ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), -1) &&
-         add_rim(mesh, zone, p, f);
-    if (ok && b >= 0) ok = rc_face_add(mesh, loop, n, sign[b] < 0, first_cell + cell_of(p, b), -1);
+    ok = rc_face_add(mesh, loop, n, sign[a] < 0, first_cell + cell_of(p, a), -1, number) && add_rim(mesh, zone, p, f);
+    if (ok && b >= 0) ok = rc_face_add(mesh, loop, n, sign[b] < 0, first_cell + cell_of(p, b), -1, number);
   }
   return ok;
 }

@@ -171,18 +171,42 @@ static void put_parents(sheet *s, int64_t parent)
             f->first + f->num, cell);
 }
 
-/* What mesh each face comes from. */
-static void put_origins(sheet *s, int64_t parent)
+/* One word of each face's head; most: its greatest value on any rank. */
+static void put_face_word(sheet *s, int64_t parent, const char *name, int64_t place, int64_t most)
 {
   const rslice_rows *f      = &s->faces;
-  int64_t           *origin = rc_draft_own(&s->draft, f->num, sizeof *origin);
-  const int64_t at = rc_draft_put(&s->draft, parent, "FaceAncestors", "UserDefinedData_t", NULL, 0, NULL, 0, NULL);
+  int64_t           *values = rc_draft_own(&s->draft, f->num, sizeof *values);
 
-  for (int64_t i = 0; origin && i < f->num; i++) origin[i] = f->word[f->offset[i] + 3];
-  put_slice(s, at, "LiesIn", "DataArray_t", "I4", 1, &s->content->mesh->global_faces, f->first, f->first + f->num, origin);
+  for (int64_t i = 0; values && i < f->num; i++) values[i] = f->word[f->offset[i] + place];
+  put_slice(s, parent, name, "DataArray_t", int_type(most), 1, &s->content->mesh->global_faces, f->first, f->first + f->num,
+            values);
+}
+
+/* In which faces of what mesh each face lies. Collective. */
+static void put_origins(sheet *s, int64_t parent)
+{
+  const int64_t at = rc_draft_put(&s->draft, parent, "FaceAncestors", "UserDefinedData_t", NULL, 0, NULL, 0, NULL);
+  int64_t       most[RSLICE_FACE_HEAD] = {0};
+
+  for (int64_t i = 0; i < s->faces.num; i++)
+    for (int k = RSLICE_FACE_CELL; k < RSLICE_FACE_HEAD; k++)
+      if (s->faces.word[s->faces.offset[i] + k] > most[k]) most[k] = s->faces.word[s->faces.offset[i] + k];
+  MPI_Allreduce(MPI_IN_PLACE, most, RSLICE_FACE_HEAD, MPI_INT64_T, MPI_MAX, s->file.comm);
+  put_face_word(s, at, "LiesIn", RSLICE_FACE_ORIGIN, 3);
+  for (int side = 0; side < 2; side++) {
+    char name[RC_NAME + 8];
+
+    if (!s->content->face_cell[side] || !s->content->face_number[side]) continue;
+    snprintf(name, sizeof name, "%.27sCell", s->content->ancestor[side]);
+    put_face_word(s, at, name, RSLICE_FACE_CELL + side, most[RSLICE_FACE_CELL + side]);
+    snprintf(name, sizeof name, "%.27sFace", s->content->ancestor[side]);
+    put_face_word(s, at, name, RSLICE_FACE_NUMBER + side, most[RSLICE_FACE_NUMBER + side]);
+  }
   rc_draft_text(&s->draft, at, "Meaning", "Descriptor_t",
-                "1: in a face of the first ancestors' mesh, 2: of the second ones', 3: of both. That face is the one between "
-                "the ancestors of the cells on both sides.");
+                "LiesIn - 1: in a face of the first ancestors' mesh, 2: of the second ones', 3: of both; ...Cell: a cell of "
+                "that mesh beside that face, as ancestors are counted; ...Face: the element number of that face if the zone of "
+                "that cell has NGON_n, else its number in that cell by SIDS, a cell of a block being a HEXA_8; of a surface, "
+                "the number of its polygon. 0: in none.");
 }
 
 static void put_elements(sheet *s)

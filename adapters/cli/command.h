@@ -83,6 +83,19 @@ cli_exit cli_boundaries_take(MPI_Comm comm, remap_context *ctx, remap_side side,
 /** Give them back; harmless on none. Not collective. */
 void cli_boundaries_drop(cli_boundaries *boundaries);
 
+/** In which faces of the operands those of a supermesh lie. Owned: cli_ancestors_drop; all NULL is none. */
+typedef struct cli_ancestors {
+  int64_t *cell[2], *number[2]; /**< [side][faces of the supermesh on this rank] as in rslice_content */
+} cli_ancestors;
+
+/** Those of one operand, whose faces the file calls number [faces of mesh]; NULL: as they are numbered in mesh, from 1.
+ *  num_faces: of the supermesh of ctx on this rank. Collective. Errors: INTERNAL. */
+cli_exit cli_ancestors_take(MPI_Comm comm, remap_context *ctx, remap_side side, const remap_mesh *mesh, const int64_t *number,
+                            int64_t num_faces, cli_ancestors *to, cli_failure *why);
+
+/** Give them back; harmless on none. Not collective. */
+void cli_ancestors_drop(cli_ancestors *ancestors);
+
 /** "" or "s", for a count of things. Not collective. */
 const char *cli_plural(int64_t count);
 

@@ -49,8 +49,9 @@ static cli_exit open_file(cli_job *j, remap_side side, cli_failure *why)
   rcgns_message      message;
 
   rcgns_options_default(&how);
-  how.base     = options->base[side];
-  how.location = options->location;
+  how.base         = options->base[side];
+  how.location     = options->location;
+  how.face_numbers = options->supermesh != NULL;
   if (side == REMAP_SOURCE) {
     how.scale = options->scale;
     if (options->transform) {

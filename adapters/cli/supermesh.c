@@ -33,11 +33,27 @@ static cli_exit take_boundaries(cli_job *j, cli_boundaries *to, int64_t num_face
   return CLI_DONE;
 }
 
+/* In which faces of the files its faces lie; not of SOURCE where --priority cut its cells, nor of dual cells. Collective. */
+static cli_exit take_faces(cli_job *j, cli_ancestors *to, rslice_content *content, cli_failure *why)
+{
+  for (int side = 0; side < 2; side++) {
+    const remap_mesh *mesh   = rcgns_mesh(j->file[side]);
+    const int64_t    *number = rcgns_face_numbers(j->file[side]);
+
+    if (j->options.location == RCGNS_VERTICES || (j->cut && side == REMAP_SOURCE)) continue;
+    CLI_TRY(cli_ancestors_take(j->comm, j->ctx, (remap_side)side, mesh, number, content->mesh->num_faces, to, why));
+    content->face_cell[side]   = to->cell[side];
+    content->face_number[side] = to->number[side];
+  }
+  return CLI_DONE;
+}
+
 /* The supermesh with ancestors and boundaries as they are numbered in the files. Collective. */
 static cli_exit write_supermesh(cli_job *j, remap_supermesh_view *view, int64_t *ancestor, cli_failure *why)
 {
   rslice_content content = {.mesh = view, .ancestor = {"AncestorSource", "AncestorTarget"}};
   cli_boundaries b       = {.num = 0};
+  cli_ancestors  faces   = {.cell = {NULL, NULL}};
   cli_exit       code;
 
   CLI_TRY(cli_source_ancestors(j, view, ancestor, why));
@@ -47,8 +63,10 @@ static cli_exit write_supermesh(cli_job *j, remap_supermesh_view *view, int64_t 
   content.boundary_name             = b.name;
   content.boundary_type             = b.type;
   content.face_boundary             = b.face;
+  if (code == CLI_DONE) code = take_faces(j, &faces, &content, why);
   if (code == CLI_DONE) code = write_file(j, &content, why);
   cli_boundaries_drop(&b);
+  cli_ancestors_drop(&faces);
   return code;
 }
 

@@ -96,6 +96,8 @@ rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_
     put(&r, turn ? mine : other);
     put(&r, content->num_boundaries ? content->face_boundary[f] : -1);
     put(&r, (m->face_from[0][f] >= 0) + 2 * (m->face_from[1][f] >= 0));
+    for (int side = 0; side < 2; side++) put(&r, content->face_cell[side] ? content->face_cell[side][f] : 0);
+    for (int side = 0; side < 2; side++) put(&r, content->face_number[side] ? content->face_number[side][f] : 0);
     put_loop(&r, m, f, turn);
     close_row(&r, m->face_global[f]);
   }

@@ -3,8 +3,8 @@
  * files that appear when they are complete.
  *
  * A global array of n rows is written in slices: rank r has the rows from ra_share(n, r, size) (base.h) up to that of rank
- * r + 1. The rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that is
- * written in their order, whatever the number of ranks. No rank ever holds more than its slices and its own part. */
+ * r + 1. The rows come from wherever the supermesh has them; since its numbers depend on coordinates alone, so does a file that
+ * is written in their order, whatever the number of ranks. No rank ever holds more than its slices and its own part. */
 #ifndef REMAP_ADAPTERS_SLICES_H
 #define REMAP_ADAPTERS_SLICES_H
 
@@ -63,6 +63,9 @@ typedef struct rslice_content {
   const char *const  *boundary_name; /**< [num_boundaries] */
   const char *const  *boundary_type; /**< [num_boundaries] BCType_t of CGNS, as text; NULL: all UserDefined */
   const int32_t      *face_boundary; /**< [faces of this rank] -1: none; may be NULL if num_boundaries is 0 */
+  const int64_t      *face_cell[2];   /**< [side][faces of this rank] of the face of that mesh it lies in, a cell beside: its
+                                           number, counted from 1; 0: it lies in none; NULL: not known */
+  const int64_t      *face_number[2]; /**< [side][faces of this rank] what that face is called there; NULL as face_cell */
 } rslice_content;
 
 /** Rows of words of 8 bytes. Owned: rslice_drop. All zero is none. */
@@ -88,11 +91,13 @@ void rslice_drop(rslice_rows *rows);
 /** The nodes' coordinates: rows of 3 words, doubles bit by bit. Collective. */
 rslice_status rslice_nodes(MPI_Comm comm, const remap_supermesh_view *mesh, rslice_rows *out);
 
-enum { RSLICE_FACE_HEAD = 4 }; /**< words of a row of rslice_faces before the nodes */
+enum { RSLICE_FACE_HEAD = 8 }; /**< words of a row of rslice_faces before the nodes */
+enum { RSLICE_FACE_ORIGIN = 3, RSLICE_FACE_CELL = 4, RSLICE_FACE_NUMBER = 6 };
 
-/** The faces: rows {owner, neighbour or -1, boundary or -1, origin, nodes ...}, all global numbers; the normal points out of
- *  the owner, which is the lower cell; the loop begins at its lowest node. Origin: 1 if it lies in a face of the source, plus 2
- *  if it lies in one of the target. Collective. */
+/** The faces: rows {owner, neighbour or -1, boundary or -1, origin, cells of both sides, numbers of both sides, nodes ...},
+ *  nodes and cells of the supermesh by global numbers; the normal points out of the owner, which is the lower cell; the loop
+ *  begins at its lowest node. Origin: 1 if it lies in a face of the source, plus 2 if it lies in one of the target; cells and
+ *  numbers are those of face_cell and face_number, 0 where these are NULL. Collective. */
 rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_rows *out);
 
 /** The cells: rows {ancestors, volume, fields ..., then their faces}; ancestors as in their fields, numbers bit by bit. Faces

@@ -526,6 +526,10 @@ REMAP_API remap_status remap_supermesh_cell_values(remap_context *ctx, remap_sid
 REMAP_API remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none,
                                                    int32_t *out);
 
+/** The same for numbers of 64 bits, say those that faces have in a file. */
+REMAP_API remap_status remap_supermesh_face_numbers(remap_context *ctx, remap_side side, const int64_t *in, int64_t none,
+                                                    int64_t *out);
+
 /** End a context and set *ctx to NULL. Collective, and harmless on a NULL context. No rank waits for another, so ranks may end
  *  several contexts in different orders where MPI_Comm_free allows it. */
 REMAP_API void remap_destroy(remap_context **ctx);

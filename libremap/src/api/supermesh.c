@@ -92,7 +92,7 @@ remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *
 
 /* ---- what belongs to the operands -------------------------------------------------------------------------------- */
 
-/* What can be wrong with a call of the two functions below on this rank. Not collective. */
+/* What can be wrong with a call of the functions below on this rank. Not collective. */
 static remap_status may_carry(const remap_context *ctx, remap_side side, bool faces, const void *in, const void *out,
                               rm_reason *reason)
 {
@@ -136,6 +136,12 @@ remap_status remap_supermesh_cell_values(remap_context *ctx, remap_side side, co
 }
 
 remap_status remap_supermesh_face_values(remap_context *ctx, remap_side side, const int32_t *in, int32_t none, int32_t *out)
+{
+  RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
+  return carry(ctx, side, true, sizeof *in, in, &none, out);
+}
+
+remap_status remap_supermesh_face_numbers(remap_context *ctx, remap_side side, const int64_t *in, int64_t none, int64_t *out)
 {
   RM_REQUIRE(ctx, REMAP_BAD_ARGUMENT);
   return carry(ctx, side, true, sizeof *in, in, &none, out);
