@@ -93,6 +93,40 @@ static void what_is_kept_is_meshes_and_pairs(void)
   if (!RT_CHECK(b.kept <= a.kept)) printf("# kept %.0f and %.0f bytes per target cell\n", a.kept, b.kept);
 }
 
+/* Bytes per target cell that transfers of so many fields add to what a build keeps. */
+static double moving_takes(int n, int num_fields)
+{
+  tm_mesh         *mesh[2];
+  remap_context   *ctx      = NULL;
+  remap_field_desc field[9] = {{.name = NULL}};
+  double          *value[2];
+
+  for (int side = 0; side < 2; side++) {
+    mesh[side]  = tm_hexahedra((int[]){n + side, n + side, n + side}, tm_warp, &(tm_warping){.03, side ? .1 : .7});
+    value[side] = tm_alloc_(num_fields * mesh[side]->view.num_cells, sizeof *value[side]);
+  }
+  for (int f = 0; f < num_fields; f++)
+    field[f] = (remap_field_desc){.in  = value[0] + f * mesh[0]->view.num_cells,
+                                  .out = value[1] + f * mesh[1]->view.num_cells};
+  RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &ctx), REMAP_OK);
+  for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, side, &mesh[side]->view), REMAP_OK);
+  RT_EQ(remap_build(ctx), REMAP_OK);
+  const size_t before = held;
+  RT_EQ(remap_field(ctx, REMAP_FORWARD, NULL, num_fields, field, NULL), REMAP_OK);
+  const double bytes = (double)(held - before) / (double)mesh[1]->view.num_cells;
+  remap_destroy(&ctx);
+  for (int side = 0; side < 2; side++) tm_free(mesh[side]), free(value[side]);
+  return bytes;
+}
+
+/* By the default transfer, of order 2 and limited. */
+static void moving_fields_takes_a_stencil_and_what_travels_once(void)
+{
+  const double one = moving_takes(20, 1), many = moving_takes(20, 9);
+
+  if (!RT_CHECK(one <= 950 && many - one <= 8 * 90)) printf("# one field %.0f, 9 fields %.0f bytes per target cell\n", one, many);
+}
+
 static void without_blocks_the_peak_is_that_of_a_whole_overlay(void)
 {
   const amounts whole = build(16, REMAP_FACES_DIAGONAL, INT64_MAX), blocks = build(16, REMAP_FACES_DIAGONAL, 5000);
@@ -101,4 +135,5 @@ static void without_blocks_the_peak_is_that_of_a_whole_overlay(void)
 }
 
 RT_MAIN(RT_CASE(a_build_of_warped_grids_stays_within_its_bounds), RT_CASE(what_is_kept_is_meshes_and_pairs),
+        RT_CASE(moving_fields_takes_a_stencil_and_what_travels_once),
         RT_CASE(without_blocks_the_peak_is_that_of_a_whole_overlay))

@@ -169,6 +169,21 @@ static void counts_become_offsets(void)
   RT_EQ(none[0], 0);
 }
 
+static void items_are_grouped_by_key_in_their_order_and_left_out_below_0(void)
+{
+  const rm_lid key[8] = {2, 0, -1, 2, 4, 0, -1, 2}, expected[6] = {1, 5, 0, 3, 7, 4}, begin[6] = {0, 2, 2, 5, 5, 6};
+  rm_lid       order[8];
+  int64_t      offset[6];
+
+  RT_EQ(rm_group(8, key, 5, offset, order), 6);
+  for (int i = 0; i < 6; i++) {
+    RT_EQ(offset[i], begin[i]);
+    RT_EQ(order[i], expected[i]);
+  }
+  RT_EQ(rm_group(0, NULL, 0, offset, NULL), 0);
+  RT_EQ(offset[0], 0);
+}
+
 static void zeros_of_both_signs_hash_alike(void)
 {
   const double plus[3] = {0.0, 1.0, 0.0}, minus[3] = {-0.0, 1.0, -0.0}, turned[3] = {1.0, 0.0, 0.0};
@@ -221,5 +236,6 @@ static void points_of_a_grid_do_not_collide(void)
 RT_MAIN(RT_CASE(keys_are_sorted_and_equal_keys_keep_their_order), RT_CASE(words_are_sorted), RT_CASE(doubles_are_sorted),
         RT_CASE(minus_zero_comes_before_plus_zero), RT_CASE(quicksort_killer_is_sorted_in_time),
         RT_CASE(sum_of_a_list_does_not_depend_on_its_order), RT_CASE(sum_of_a_list_is_compensated),
-        RT_CASE(counts_become_offsets), RT_CASE(zeros_of_both_signs_hash_alike),
+        RT_CASE(counts_become_offsets), RT_CASE(items_are_grouped_by_key_in_their_order_and_left_out_below_0),
+        RT_CASE(zeros_of_both_signs_hash_alike),
         RT_CASE(every_bit_of_a_word_reaches_every_bit_of_its_hash), RT_CASE(points_of_a_grid_do_not_collide))

@@ -212,3 +212,17 @@ int64_t rm_offsets(int64_t *count, int64_t n)
   count[n] = at;
   return at;
 }
+
+int64_t rm_group(int64_t n, const rm_lid *key, int64_t num_keys, int64_t *offset, rm_lid *order)
+{
+  RM_ASSERT(n <= INT32_MAX);
+  for (int64_t i = 0; i <= num_keys; i++) offset[i] = 0;
+  for (int64_t k = 0; k < n; k++)
+    if (key[k] >= 0) offset[key[k]]++;
+  rm_offsets(offset, num_keys);
+  for (int64_t k = 0; k < n; k++)
+    if (key[k] >= 0) order[offset[key[k]]++] = (rm_lid)k;
+  for (int64_t i = num_keys; i > 0; i--) offset[i] = offset[i - 1]; /* each key's end is the next one's begin */
+  offset[0] = 0;
+  return offset[num_keys];
+}

@@ -62,6 +62,8 @@ typedef struct rm_plan {
  * The plan lives in arena. */
 remap_status rm_plan_build(const rm_comm *comm, rm_arena *arena, int64_t num_want, const int *want_rank,
                            const rm_lid *want_item, const rm_plan **out);
+/* The same plan with items under other numbers, new_of[item]. Not collective. Lives in arena, borrows from plan. NO_MEMORY. */
+remap_status rm_plan_renumber(rm_arena *arena, const rm_plan *plan, const rm_lid *new_of, const rm_plan **out);
 /* Move `size` bytes per item: item is indexed by send_item, received is [recv_offset[num_recv]]; buffer is scratch for
  * send_offset[num_send] items. Among neighbours only: returns as soon as this rank has sent and received. */
 remap_status rm_plan_run(const rm_comm *comm, const rm_plan *plan, size_t size, const void *item, void *received, void *buffer);
@@ -129,6 +131,9 @@ typedef struct rm_flow {
 
 /* Room for runs of at most `most` bytes per item. Not collective. Lives in arena. NO_MEMORY. */
 remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size_t most, rm_flow *out);
+/* The same into room of the caller's, [plan->recv_offset[plan->num_recv]] items at least. Items may be sent from there too,
+ * under the numbers of their places: then those that this rank wants from itself are where they belong and stay. */
+remap_status rm_flow_init_into(rm_arena *arena, const rm_plan *plan, int stream, size_t most, void *received, rm_flow *out);
 /* Send `size` bytes of each item, indexed by the plan's send_item, behind this rank's note; items may be changed afterwards.
  * parley may be NULL: then everybody is there. */
 remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,

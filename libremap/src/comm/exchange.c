@@ -165,6 +165,21 @@ done:
   return status;
 }
 
+remap_status rm_plan_renumber(rm_arena *arena, const rm_plan *plan, const rm_lid *new_of, const rm_plan **out)
+{
+  const int64_t num = plan->send_offset[plan->num_send];
+  rm_plan      *renumbered;
+  rm_lid       *item;
+
+  RM_NEW(renumbered, arena, 1);
+  RM_NEW(item, arena, num);
+  for (int64_t k = 0; k < num; k++) item[k] = new_of[plan->send_item[k]];
+  *renumbered           = *plan;
+  renumbered->send_item = item;
+  *out                  = renumbered;
+  return REMAP_OK;
+}
+
 /* The items to send, gathered in the plan's order. */
 static void pack(const rm_plan *plan, size_t size, const char *item, char *buffer)
 {

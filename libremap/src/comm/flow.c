@@ -35,10 +35,12 @@ static int64_t bytes_of(const int64_t *offset, int i, size_t size)
   return rm_mul_sat(offset[i + 1] - offset[i], (int64_t)size);
 }
 
-remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out)
+/* As rm_flow_init_into, unless received is NULL: then as rm_flow_init. */
+static remap_status init(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, void *received,
+                         rm_flow *out)
 {
   int64_t num_requests = plan->num_send;
-  rm_flow flow         = {.plan = plan, .stream = stream, .most = most, .chunk = chunk};
+  rm_flow flow         = {.plan = plan, .stream = stream, .most = most, .chunk = chunk, .received = received};
 
   RM_ASSERT(sizeof *flow.arrived == RM_FIRST_BYTES);
   for (int i = 0; i < plan->num_send; i++)
@@ -47,7 +49,7 @@ remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan 
     num_requests = rm_add_sat(num_requests, num_pieces(bytes_of(plan->recv_offset, i, most), chunk));
   RM_NEW(flow.sent, arena, start_of(plan, plan->num_send, most));
   RM_NEW(flow.arrived, arena, plan->num_recv);
-  RM_NEW(flow.received, arena, rm_add_sat(rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most), SPARE));
+  if (!received) RM_NEW(flow.received, arena, rm_add_sat(rm_mul_sat(plan->recv_offset[plan->num_recv], (int64_t)most), SPARE));
   RM_NEW(flow.first, arena, plan->num_recv);
   RM_NEW(flow.rest, arena, plan->num_recv);
   RM_NEW(flow.request, arena, num_requests);
@@ -55,9 +57,19 @@ remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan 
   return REMAP_OK;
 }
 
+remap_status rm_flow_init_chunked(rm_arena *arena, int64_t chunk, const rm_plan *plan, int stream, size_t most, rm_flow *out)
+{
+  return init(arena, chunk, plan, stream, most, NULL, out);
+}
+
 remap_status rm_flow_init(rm_arena *arena, const rm_plan *plan, int stream, size_t most, rm_flow *out)
 {
-  return rm_flow_init_chunked(arena, RM_COMM_CHUNK, plan, stream, most, out);
+  return init(arena, RM_COMM_CHUNK, plan, stream, most, NULL, out);
+}
+
+remap_status rm_flow_init_into(rm_arena *arena, const rm_plan *plan, int stream, size_t most, void *received, rm_flow *out)
+{
+  return init(arena, RM_COMM_CHUNK, plan, stream, most, received, out);
 }
 
 /* Items wanted by neighbour i of a plan, one after the other: those that stand one after the other are copied at once. */
@@ -137,12 +149,13 @@ static remap_status send(const rm_comm *comm, rm_flow *flow, const rm_parley *pa
   return post_pieces(comm, flow, true, rank, note.tag, at + NOTE, bytes);
 }
 
-/* Items that this rank wants from itself. */
+/* Items that this rank wants from itself, unless they are there. */
 static void keep_own(rm_flow *flow, const char *item)
 {
   const rm_plan *plan = flow->plan;
 
-  if (plan->own_send >= 0) gather(plan, plan->own_send, flow->size, item, place_of(flow, plan->own_recv));
+  if (plan->own_send >= 0 && item != flow->received)
+    gather(plan, plan->own_send, flow->size, item, place_of(flow, plan->own_recv));
 }
 
 remap_status rm_flow_post(const rm_comm *comm, rm_flow *flow, rm_parley *parley, bool opens, size_t size, const void *item,

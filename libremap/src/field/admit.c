@@ -24,9 +24,10 @@ void rm_limits_clear(const rm_packing *packing, rm_limits limits)
 void rm_limits_add(const rm_packing *packing, const double *place, rm_limits limits)
 {
   for (int f = 0; f < packing->num_fields; f++) {
-    const double *bounds = place + packing->at[f] + RM_PACK_BOUNDS;
+    double bounds[2];
 
     if (packing->system_of[f] < 0) continue;
+    rm_pack_read(packing, f, place, RM_PACK_BOUNDS, 2, bounds);
     const double least = bounds[0] / RM_VALUE_SCALE, greatest = bounds[1] / RM_VALUE_SCALE;
     limits.least[f]    = least < limits.least[f] ? least : limits.least[f]; /* not by fmin, which is a call */
     limits.greatest[f] = greatest > limits.greatest[f] ? greatest : limits.greatest[f];
@@ -161,10 +162,12 @@ static void add_content(const rm_packing *p, int s, const double *place, double 
                         const double second[6], double *content, double *change)
 {
   for (int f = 0; f < p->num_fields; f++) {
-    const double *at = place + p->at[f], *g = at + RM_PACK_SLOPE, *h = at + rm_pack_curvature(p->has_bounds);
+    double g[3], h[7];
 
     if (p->system_of[f] != s) continue;
-    content[f] += RM_VALUE_SCALE * at[0] * volume;
+    rm_pack_read(p, f, place, RM_PACK_SLOPE, 3, g);
+    rm_pack_read(p, f, place, rm_pack_curvature(p->has_bounds), 7, h);
+    content[f] += RM_VALUE_SCALE * place[p->at[f]] * volume;
     change[f] += g[0] * m[0] + g[1] * m[1] + g[2] * m[2] + rm_dot6(h, second) + h[6] * volume;
   }
 }
@@ -227,16 +230,14 @@ static double factor_of(const rm_admission *w, const rm_transfer_setup *setup, c
 static void scale(const rm_packing *p, int s, double factor, double *place)
 {
   for (int f = 0; f < p->num_fields; f++) {
-    double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
-
     if (p->system_of[f] != s) continue;
-    for (int d = 0; d < 3; d++) at[RM_PACK_SLOPE + d] *= factor;
-    for (int k = 0; k < 7; k++) h[k] *= factor;
+    rm_pack_scale(p, f, factor, RM_PACK_SLOPE, 3, place);
+    rm_pack_scale(p, f, factor, rm_pack_curvature(p->has_bounds), 7, place);
   }
 }
 
 /* Scale the cells that were refused by somebody for the first time. True if there is any. */
-static bool scale_refused(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack)
+static bool scale_refused(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, const rm_profile *giving)
 {
   const rm_rows *rows    = setup->giving_rows;
   const uint8_t *refused = (const uint8_t *)w->refusals.received;
@@ -253,40 +254,40 @@ static bool scale_refused(rm_admission *w, const rm_transfer_setup *setup, const
         is_hit |= refused[(int64_t)rows->giver[k] * n + s] != 0;
       if (!is_hit) continue;
       w->is_scaled[(int64_t)c * n + s] = 1;
-      *factor                          = factor_of(w, setup, p, s, c, pack + (int64_t)c * p->width);
-      scale(p, s, *factor, pack + (int64_t)c * p->width);
+      *factor                          = factor_of(w, setup, p, s, c, rm_pack_of(giving, p, c));
+      scale(p, s, *factor, rm_pack_of(giving, p, c));
       any |= *factor < 1.0;
     }
   return any;
 }
 
 /* One round. True if some slope was scaled on some rank. Collective. */
-static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got,
+static bool run_round(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, const rm_profile *giving,
                       rm_word *word)
 {
   const size_t n   = (size_t)p->num_systems;
   int64_t      any = 0;
 
-  if (word->note.status == REMAP_OK) refuse(w, setup, p, got);
+  if (word->note.status == REMAP_OK) refuse(w, setup, p, giving->pack);
   rm_word_post(word, setup->comm, &w->refusals, n, w->refused);
   rm_word_await(word, setup->comm, &w->refusals);
-  if (word->note.status == REMAP_OK) any = scale_refused(w, setup, p, pack);
+  if (word->note.status == REMAP_OK) any = scale_refused(w, setup, p, giving);
   rm_word_post(word, setup->comm, &w->factors, n * sizeof(double), w->factor);
   rm_word_await(word, setup->comm, &w->factors);
   for (rm_lid g = 0; g < setup->rows->num_givers && word->note.status == REMAP_OK; g++)
-    for (int s = 0; s < p->num_systems; s++)
+    for (int s = 0; s < p->num_systems && setup->rows->giver_rank[g] != setup->comm->rank; s++) /* own ones are scaled */
       if (rm_flow_numbers(&w->factors)[(int64_t)g * p->num_systems + s] < 1.0)
-        scale(p, s, rm_flow_numbers(&w->factors)[(int64_t)g * p->num_systems + s], got + (int64_t)g * p->width);
+        scale(p, s, rm_flow_numbers(&w->factors)[(int64_t)g * p->num_systems + s], giving->pack + (int64_t)g * p->width);
   if (!rm_word_agree(word, setup->comm)) return false;
   rm_word_add(word, rm_comm_max_i64(setup->comm, &any, 1));
   return any != 0;
 }
 
-void rm_admission_run(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, double *pack, double *got,
+void rm_admission_run(rm_admission *w, const rm_transfer_setup *setup, const rm_packing *p, const rm_profile *giving,
                       rm_word *word)
 {
   for (int64_t k = 0; k < (int64_t)setup->receiving->num_cells * p->num_systems; k++) w->refused[k] = 0;
   for (int64_t k = 0; k < (int64_t)setup->giving->num_cells * p->num_systems; k++) w->is_scaled[k] = 0;
-  while (run_round(w, setup, p, pack, got, word) && word->note.status == REMAP_OK) {
+  while (run_round(w, setup, p, giving, word) && word->note.status == REMAP_OK) {
   }
 }

@@ -8,9 +8,9 @@
  * mean is over the covered part alone (which has been kept within the bounds) or over more than that. */
 static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, double bounds[2])
 {
-  const rm_rows *rows          = w->setup->rows;
-  const uint8_t  cover         = rows->cover[cell];
-  const int64_t  place_in_pack = (int64_t)cell * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;
+  const rm_rows *rows  = w->setup->rows;
+  const uint8_t  cover = rows->cover[cell];
+  double         given[2];
 
   if (w->packing->order[f] < 2 || w->packing->system_of[f] >= 0 || !rm_is_mapped(cover)) return false;
   if (rm_is_copied(rows, w->setup->receiving_differs, cell, rm_is_amount(w->packing, f))) return false;
@@ -20,13 +20,12 @@ static bool bounds_of(const rm_receipt *w, int f, rm_lid cell, double old, doubl
   if (cover == REMAP_PARTIAL) {
     if (!rm_keeps_old(w->how, &w->fields[f], cover)) return false;
     bounds[0] = bounds[1] = RM_VALUE_SCALE * old;
-    for (int b = 0; b < 2 && w->keeping; b++) bounds[b] = w->keeping->pack[place_in_pack + b];
+    if (w->keeping) rm_pack_read(w->packing, f, rm_pack_of(w->keeping, w->packing, cell), RM_PACK_BOUNDS, 2, bounds);
   }
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const double *given = w->got + (int64_t)rows->giver[k] * w->packing->width + w->packing->at[f] + RM_PACK_BOUNDS;
-
-    bounds[0] = fmin(bounds[0], given[0]);
-    bounds[1] = fmax(bounds[1], given[1]);
+    rm_pack_read(w->packing, f, w->got + (int64_t)rows->giver[k] * w->packing->width, RM_PACK_BOUNDS, 2, given);
+    bounds[0] = given[0] < bounds[0] ? given[0] : bounds[0]; /* not by fmin, which is a call */
+    bounds[1] = given[1] > bounds[1] ? given[1] : bounds[1];
   }
   return isfinite(bounds[0]) && isfinite(bounds[1]);
 }
@@ -39,7 +38,7 @@ static double volume_of(const rm_receipt *w, int f, rm_lid cell)
   return w->setup->receiving_measure && rm_is_amount(w->packing, f) ? volume * w->setup->receiving_measure[cell] : volume;
 }
 
-static double clip(double x, const double bounds[2]) { return fmin(fmax(x, bounds[0]), bounds[1]); }
+static double clip(double x, const double bounds[2]) { return x < bounds[0] ? bounds[0] : x > bounds[1] ? bounds[1] : x; }
 
 void rm_caas_sum(const rm_receipt *w, const double *old, rm_sum *sum)
 {
@@ -53,8 +52,10 @@ void rm_caas_sum(const rm_receipt *w, const double *old, rm_sum *sum)
 
       if (!isfinite(value) || !bounds_of(w, f, c, old[(int64_t)c * num + f], bounds)) continue;
       clipped = clip(value, bounds);
-      rm_integral_add(&sum[3 * f], value, volume);
-      rm_integral_add(&sum[3 * f], -clipped, volume);
+      if (clipped < value || clipped > value) { /* else they cancel */
+        rm_integral_add(&sum[3 * f], value, volume);
+        rm_integral_add(&sum[3 * f], -clipped, volume);
+      }
       rm_integral_add(&sum[3 * f + 1], bounds[1] - clipped, volume);
       rm_integral_add(&sum[3 * f + 2], clipped - bounds[0], volume);
     }
@@ -77,7 +78,7 @@ void rm_caas_settle(const rm_receipt *w, const double *old, const rm_sum *sum, i
       limited[f] += settled < value || settled > value;
       settled += share * ((missing > 0.0 ? bounds[1] : bounds[0]) - settled);
       *place = settled / RM_VALUE_SCALE;
-      if (!w->integral) continue;
+      if (!w->integral || !(settled < value || settled > value)) continue;
       rm_integral_add(&w->integral[f].minus_target, value, volume);
       rm_integral_add(&w->integral[f].minus_target, -settled, volume);
     }

@@ -81,6 +81,7 @@ typedef struct rm_load {
   bool has_slopes;  /* needs the stencil's halo                       */
   bool is_settled;  /* limiter CAAS: old values and sums are kept     */
   bool is_checked;  /* limiter auto: slopes and roughness travel too    */
+  bool keeps_bounds; /* the same where bounds do not travel              */
   bool is_wide;     /* of the widened stencil, for order 3            */
   bool is_curved;   /* systems with slopes: second moments of cells   */
   bool is_blended;  /* old content outside is reconstructed too       */

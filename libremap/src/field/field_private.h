@@ -52,11 +52,12 @@ bool rm_quadratic_weights(int64_t n, const double (*d)[3], const double (*spread
  * stay finite. It changes no digit of what is not below 1e-280. */
 #define RM_VALUE_SCALE 0x1p-64
 
-/* What travels for a giving cell, `width` doubles, field after field from at[f] on: the value as the caller gave it, of a field
- * in a system the amount per volume (at order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of
- * its own alone, whose value is copied as given); where the field has slopes, three slopes of the scaled value, then, if asked
- * for, least and greatest value around, scaled (of a field in a system: of the amount per mass); where it has curvature six
- * coefficients h of the scaled value and the constant that gives h:(y y^T) zero mean over the cell. */
+/* What travels for a giving cell, `width` doubles: per field the value as the caller gave it, of a field in a system the amount
+ * per volume (at order 2 the reconstruction's at the centroid as rounded, unless the cell has a pair of its own alone, whose
+ * value is copied as given); where the field has slopes, three slopes of the scaled value, then, if asked for, least and
+ * greatest value around, scaled (of a field in a system: of the amount per mass); where it has curvature six coefficients h of
+ * the scaled value and the constant that gives h:(y y^T) zero mean over the cell. Span after span; in a span row after row, the
+ * values of its fields, their slopes along x and so on: number k of field f stands at at[f] + k step[f]. */
 
 /* Fields that are moved together, by number; -1: there is none. */
 typedef struct rm_system {
@@ -73,7 +74,7 @@ typedef struct rm_packing {
   const remap_transfer   *how;
   const remap_field_desc *fields;
   int                     num_fields, width;
-  int                    *at;        /* [num_fields]                                              */
+  int                    *at, *step; /* [num_fields]                                              */
   int                    *order;     /* [num_fields] 1, 2 or 3: of what is reconstructed          */
   int                    *degree;    /* [num_fields] 0, 1 or 2: of the polynomials that travel    */
   int                    *system_of; /* [num_fields] number in the list, -1: none                 */
@@ -86,13 +87,27 @@ typedef struct rm_packing {
   bool                    is_limited; /* Barth-Jespersen                                           */
   bool                    is_checked; /* but not in cells that are smooth                          */
 } rm_packing;
-enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* places after at[f] */
+enum { RM_PACK_SLOPE = 1, RM_PACK_BOUNDS = 4 }; /* number of the first of them */
 
-/* Place of h after at[f], the constant behind it; and how many places a field takes. */
+/* Number of the first coefficient of h, the constant is the seventh; and how many a field has. */
 static inline int rm_pack_curvature(bool has_bounds) { return has_bounds ? RM_PACK_BOUNDS + 2 : RM_PACK_BOUNDS; }
 static inline int rm_pack_width(int degree, bool has_bounds)
 {
   return degree == 0 ? 1 : rm_pack_curvature(has_bounds) + (degree > 1 ? 7 : 0);
+}
+
+/* Numbers first to first + n - 1 of a field, from a cell's place in a pack and to it. */
+static inline void rm_pack_read(const rm_packing *p, int f, const double *place, int first, int n, double *out)
+{
+  for (int k = 0; k < n; k++) out[k] = place[p->at[f] + (first + k) * p->step[f]];
+}
+static inline void rm_pack_write(const rm_packing *p, int f, const double *x, int first, int n, double *place)
+{
+  for (int k = 0; k < n; k++) place[p->at[f] + (first + k) * p->step[f]] = x[k];
+}
+static inline void rm_pack_scale(const rm_packing *p, int f, double factor, int first, int n, double *place)
+{
+  for (int k = 0; k < n; k++) place[p->at[f] + (first + k) * p->step[f]] *= factor;
 }
 
 /* Does a transfer of this order give a field slopes? Of which degree are its polynomials? */
@@ -154,11 +169,6 @@ static inline void rm_moments_about(const rm_rows *rows, int64_t k, double volum
   }
 }
 
-/* Numbers of the giving cells, [giving cells][num_fields], and of the stencil's halo, [num_halo][num_fields]. */
-typedef struct rm_numbers {
-  const double *own, *halo;
-} rm_numbers;
-
 /* Values of one field: own cells, then the halo's. */
 typedef struct rm_around {
   const double *own, *halo; /* [cells][stride], this field's first value */
@@ -169,29 +179,22 @@ static inline double rm_value_at(const rm_around *u, rm_lid num_cells, rm_lid ce
   return RM_VALUE_SCALE * (cell < num_cells ? u->own[cell * u->stride] : u->halo[(cell - num_cells) * u->stride]);
 }
 
-/* Those of field f out of num. */
-static inline rm_around rm_around_of(rm_numbers numbers, int f, int num)
-{
-  return (rm_around){numbers.own ? numbers.own + f : NULL, numbers.halo ? numbers.halo + f : NULL, num};
-}
-
 /* In line, unlike isfinite. */
 static inline bool rm_is_finite(double x) { return fabs(x) <= DBL_MAX; }
 
 /* ---- fit ------------------------------------------------------------------------------------------------------- */
 
-/* Fits of the fields in one cell, scaled, row by row: written for all but flags. */
-typedef struct rm_fit {
-  double *slope;  /* [3][num_fields] */
-  double *bounds; /* [2][num_fields] least and greatest value of the cell and its neighbours, if the transfer asks for them */
-} rm_fit;
-
-/* Least-squares slopes over the vertex neighbours. Not collective. */
-void rm_fit_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_lid cell, rm_numbers numbers, rm_fit out);
-
-/* Slope and curvature, with its constant, of the quadratic polynomial of one field, scaled; the stencil is widened. False if
- * there is none: slope stays as it is and curvature is 0. */
-bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7]);
+/* Fits of the num fields of a span in one cell, u its first field; results are scaled, row by row. Not collective.
+ *
+ * Least-squares slopes over the vertex neighbours [3][num]; and, unless bounds is NULL, least and greatest value of the cell
+ * and these neighbours [2][num]. */
+void rm_fit_slopes(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *slope, double *bounds);
+/* The bounds alone. */
+void rm_fit_bounds(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *bounds);
+/* Slope [3][num] and curvature, with its constant, [7][num] of the quadratic polynomials; the stencil is widened. Bit i of what
+ * is returned: field i has one; of others both are 0. */
+unsigned rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *slope,
+                          double *curvature);
 
 /* A mesh whose fields are reconstructed. */
 typedef struct rm_ground {
@@ -206,27 +209,31 @@ typedef struct rm_ground {
 
 typedef struct rm_profile rm_profile;
 
-/* Fill the pack of cells whose needs_halo is `which`. The halo's numbers are read only for cells that need it. Cells that cover
- * nothing get slope 0. Not collective. */
-void rm_reconstruct(const rm_profile *profile, const rm_packing *packing, uint8_t which);
+/* What is done in a cell: fields are fitted to what is around; then limited and made what travels. */
+enum { RM_FIT = 1, RM_FINISH = 2 };
+/* Do either or both in the cells whose needs_halo is `which`, and fill their places in the pack. The halo's numbers are read
+ * only for cells that need it. Cells that nobody asks get slope 0 in the end. Not collective. */
+void rm_reconstruct(const rm_profile *profile, const rm_packing *packing, uint8_t which, int steps);
 
 /* ---- smooth ---------------------------------------------------------------------------------------------------- */
-
-/* Slopes of all own cells and, fourth, the range of values around them, scaled, [cells][4][num_fields]; least and greatest
- * value around, [cells][2][num_fields]. Not collective. */
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double *slope, double *bounds);
-
-/* 1 for own cells that are rough, 0 for others, [giving cells][num_fields]. Not collective. */
-void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         rm_numbers slope, double *rough);
 
 /* Cells are smooth if none within so many layers of neighbours is rough. */
 enum { RM_ROUGH_LAYERS = 3 };
 
-/* 1 for own cells that are rough or have a rough neighbour, 0 for others, [cells][num_fields]: one layer more. needs_halo
- * [cells] says whose neighbours are on other ranks. Not collective. */
-void rm_smooth_spread(const rm_ground *ground, const uint8_t *needs_halo, const rm_packing *packing, rm_numbers rough,
-                      double *spread);
+/* Which fields are rough in a cell is told by bits, so many words of them. */
+static inline int rm_rough_words(int num_fields) { return (num_fields + 63) / 64; }
+static inline bool rm_is_rough(const uint64_t *words, int f) { return words[f / 64] >> f % 64 & 1; }
+
+/* Show what neighbours look at of a span in a cell that is fitted. Not collective. */
+void rm_smooth_show(const rm_profile *profile, const rm_packing *packing, const rm_span *span, rm_lid cell);
+
+/* Which fields are rough in own cells, rough [cells][rm_rough_words]; numbers and what was shown of other ranks' cells have
+ * come. Not collective. */
+void rm_smooth_roughness(const rm_profile *profile, const rm_packing *packing, uint64_t *rough);
+
+/* Likewise in cells or a neighbour of theirs, spread [cells][rm_rough_words]: one layer more. halo: of other ranks' cells. Not
+ * collective. */
+void rm_smooth_spread(const rm_profile *profile, int num_words, const uint64_t *rough, const uint64_t *halo, uint64_t *spread);
 
 /* ---- profile --------------------------------------------------------------------------------------------------- */
 
@@ -261,24 +268,40 @@ struct rm_profile {
   rm_ground     ground;
   rm_flow       halo;           /* numbers around the stencils                                    */
   rm_flow       slopes, roughs; /* likewise slopes and roughness, if smooth cells are told from others */
-  double       *slope, *bounds; /* [cells][4][num_fields], [cells][2][num_fields] of rm_smooth_slopes */
-  double       *line;           /* [7][num_fields] of one cell                                    */
-  double       *rough, *spread; /* [cells][num_fields] 1: a cell that is rough, or near one; spread is the last layer */
+  uint32_t     *shown;          /* [cells][4 num_fields] upper halves of slopes, and of the range of values around; span after
+                                   span and row after row, as what follows: */
+  double       *bounds;         /* [cells][2 num_fields] of rm_fit_slopes, where they do not travel but are kept */
+  double       *line;           /* [7][num_fields] of one cell: its bounds, if nobody keeps them; and room */
+  uint8_t      *is_made;        /* [num_fields] likewise                                          */
+  uint64_t     *rough, *spread; /* [cells][rm_rough_words] cells that are rough, or near one; spread is the last layer */
   uint8_t      *needs_halo;     /* [cells] 1: its stencil reaches other ranks                      */
   const double *given;          /* [cells][num_fields] values as the caller has them              */
   const double *number;         /* [cells][num_fields] what is reconstructed: given, or amounts per mass */
   double       *extreme;        /* [2][num_fields] least number, then greatest, over all ranks: of fields in systems */
-  double       *pack;           /* [cells][width]                                                 */
+  double       *pack;           /* [places][width]                                                */
+  const rm_lid *place;          /* [cells] of a cell in the pack; NULL: its number                */
   int64_t      *limited;        /* [2][num_fields] cells that the limiter changed; those without a polynomial of order 3 */
 };
+static inline double *rm_pack_of(const rm_profile *w, const rm_packing *packing, rm_lid cell)
+{
+  return w->pack + (int64_t)(w->place ? w->place[cell] : cell) * packing->width;
+}
 
-/* Flows and room for a load on a ground, but for values. Not collective. Lives in arena. */
+/* The numbers of a span's first field. */
+static inline rm_around rm_around_span(const rm_profile *w, const rm_packing *packing, const rm_span *span)
+{
+  const double *halo = rm_flow_numbers(&w->halo);
+
+  return (rm_around){w->number + span->first, halo ? halo + span->first : NULL, packing->num_fields};
+}
+
+/* Where the bounds of a span are in a fitted cell, [2][span->num]; NULL if nobody asks for them. */
+double *rm_bounds_of(const rm_profile *profile, const rm_packing *packing, const rm_span *span, rm_lid cell);
+
+/* Flows and room for a load on a ground, but for values and pack. Not collective. Lives in arena. */
 remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *profile);
 /* Does a transfer read the halo? */
 bool rm_profile_reads_halo(const rm_packing *packing);
-/* What giving cells give, [cells][width]: the pack, or the values as they are if nothing else travels; the pack is not filled
- * then. */
-const double *rm_profile_gives(const rm_profile *profile, const rm_packing *packing);
 /* Send the halo's numbers. What can be done without them is done before rm_profile_finish. Among neighbours. */
 void rm_profile_post(rm_profile *profile, const rm_comm *comm, const rm_packing *packing, rm_word *word);
 /* Receive them and make the whole pack. Among neighbours. */
@@ -347,9 +370,9 @@ typedef struct rm_admission {
 
 /* Flows and room for a load. Not collective. Lives in arena. NO_MEMORY. */
 remap_status rm_admission_init(rm_arena *arena, const rm_transfer_setup *setup, const rm_load *load, rm_admission *admission);
-/* got, [givers of the rows][width], is what pack, of the giving cells, has brought: both are scaled. Collective. */
-void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing, double *pack,
-                      double *got, rm_word *word);
+/* The pack of the profile, in which the givers of the rows come first, is scaled. Collective. */
+void rm_admission_run(rm_admission *admission, const rm_transfer_setup *setup, const rm_packing *packing,
+                      const rm_profile *giving, rm_word *word);
 
 /* ---- caas ------------------------------------------------------------------------------------------------------ */
 

@@ -1,8 +1,8 @@
 /* fit -- least squares in one cell: sums of the stencil's weights times differences to the neighbours, in canonical order.
  *
- * Slopes of a few fields next to each other (a span) are summed side by side in registers: neighbours and weights are read once
- * for all of them, and two fields share each vector. A field gets the same digits with any others beside it. Values
- * are scaled by a power of two, so nothing overflows and no digit changes. O(neighbours) per field. */
+ * A few fields next to each other (a span) are summed side by side in registers: neighbours and weights are read once for all
+ * of them, and two fields share each vector. A field gets the same digits with any others beside it. Values are scaled by a
+ * power of two, so nothing overflows and no digit changes. O(neighbours) per field. */
 #include "field_private.h"
 #include "lanes.h"
 
@@ -44,11 +44,11 @@ RM_UNROLLED void fit_few(const rm_stencil *stencil, rm_lid cell, const rm_around
     const int      left    = num - 2 * t;
 
     rm_lanes_put((rm_lanes)((rm_flags)x[t] & is_good), left, slope + 2 * t);
-    rm_lanes_put((rm_lanes)((rm_flags)y[t] & is_good), left, slope + stride + 2 * t);
-    rm_lanes_put((rm_lanes)((rm_flags)z[t] & is_good), left, slope + 2 * stride + 2 * t);
+    rm_lanes_put((rm_lanes)((rm_flags)y[t] & is_good), left, slope + num + 2 * t);
+    rm_lanes_put((rm_lanes)((rm_flags)z[t] & is_good), left, slope + 2 * num + 2 * t);
     if (!bounded) continue;
     rm_lanes_put(least[t], left, bounds + 2 * t);
-    rm_lanes_put(greatest[t], left, bounds + stride + 2 * t);
+    rm_lanes_put(greatest[t], left, bounds + num + 2 * t);
   }
 }
 
@@ -75,65 +75,134 @@ RM_UNROLLED void fit_one(const rm_stencil *stencil, rm_lid cell, const rm_around
   }
   const bool is_good = rm_is_finite(xy[0]) && rm_is_finite(xy[1]) && rm_is_finite(z);
 
-  slope[0]          = is_good ? xy[0] : 0.0;
-  slope[stride]     = is_good ? xy[1] : 0.0;
-  slope[2 * stride] = is_good ? z : 0.0;
+  slope[0] = is_good ? xy[0] : 0.0;
+  slope[1] = is_good ? xy[1] : 0.0;
+  slope[2] = is_good ? z : 0.0;
   if (!bounded) return;
-  bounds[0]      = least;
-  bounds[stride] = greatest;
+  bounds[0] = least;
+  bounds[1] = greatest;
 }
 
-void rm_fit_slopes(const rm_stencil *stencil, const rm_packing *p, rm_lid cell, rm_numbers numbers, rm_fit out)
+void rm_fit_slopes(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *slope, double *bounds)
 {
-  const bool bounded = p->has_bounds || p->is_limited;
+  if (num > 2 && bounds)
+    fit_few(stencil, cell, u, num, TWOS, true, slope, bounds);
+  else if (num > 2)
+    fit_few(stencil, cell, u, num, TWOS, false, slope, NULL);
+  else if (num > 1 && bounds)
+    fit_few(stencil, cell, u, num, 1, true, slope, bounds);
+  else if (num > 1)
+    fit_few(stencil, cell, u, num, 1, false, slope, NULL);
+  else if (bounds)
+    fit_one(stencil, cell, u, true, slope, bounds);
+  else
+    fit_one(stencil, cell, u, false, slope, NULL);
+}
 
-  for (int i = 0; i < p->num_spans; i++) {
-    const int       first = p->span[i].first;
-    const rm_around u     = rm_around_of(numbers, first, p->num_fields);
-    const int       num   = p->span[i].num;
-    double         *slope = out.slope + first, *bounds = out.bounds + first;
+/* Bounds alone; twos is a constant where this is called. */
+RM_UNROLLED void bound_few(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, int twos, double *bounds)
+{
+  const int64_t  stride = u->stride;
+  const rm_lid   cells = stencil->num_cells, *neighbour = stencil->neighbour;
+  const double  *own = u->own, *halo = u->halo;
+  const rm_lanes scale = rm_lanes_of(RM_VALUE_SCALE);
+  rm_lanes       least[TWOS], greatest[TWOS];
 
-    if (num > 2 && bounded)
-      fit_few(stencil, cell, &u, num, TWOS, true, slope, bounds);
-    else if (num > 2)
-      fit_few(stencil, cell, &u, num, TWOS, false, slope, bounds);
-    else if (num > 1 && bounded)
-      fit_few(stencil, cell, &u, num, 1, true, slope, bounds);
-    else if (num > 1)
-      fit_few(stencil, cell, &u, num, 1, false, slope, bounds);
-    else if (bounded)
-      fit_one(stencil, cell, &u, true, slope, bounds);
-    else
-      fit_one(stencil, cell, &u, false, slope, bounds);
+  for (int t = 0; t < twos; t++) least[t] = greatest[t] = rm_lanes_at(own + cell * stride + 2 * t);
+  for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
+    const rm_lid  n     = neighbour[k];
+    const double *there = n < cells ? own + n * stride : halo + (n - cells) * stride;
+
+    for (int t = 0; t < twos; t++) {
+      const rm_lanes other = rm_lanes_at(there + 2 * t);
+
+      least[t]    = rm_lanes_least(other, least[t]);
+      greatest[t] = rm_lanes_greatest(other, greatest[t]);
+    }
+  }
+  for (int t = 0; t < twos; t++) {
+    rm_lanes_put(scale * least[t], num - 2 * t, bounds + 2 * t);
+    rm_lanes_put(scale * greatest[t], num - 2 * t, bounds + num + 2 * t);
   }
 }
 
-bool rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, double slope[3], double curvature[7])
+void rm_fit_bounds(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *bounds)
+{
+  if (num > 2)
+    bound_few(stencil, cell, u, num, TWOS, bounds);
+  else
+    bound_few(stencil, cell, u, num, 1, bounds);
+}
+
+/* The polynomials of two fields, the first one's numbers at u, side by side: coefficients to fit[9]. */
+static void fit_two(const rm_stencil *stencil, rm_lid cell, const rm_around *u, rm_lanes fit[9])
+{
+  const int64_t  stride = u->stride;
+  const rm_lid   cells = stencil->num_cells, *neighbour = stencil->wide_neighbour;
+  const double  *own = u->own, *halo = u->halo;
+  const rm_lanes scale = rm_lanes_of(RM_VALUE_SCALE), value = scale * rm_lanes_at(own + cell * stride);
+  rm_lanes       sum[9];
+
+  for (int i = 0; i < 9; i++) sum[i] = rm_lanes_of(0.0);
+  for (int64_t k = stencil->wide_offset[cell], end = stencil->wide_offset[cell + 1]; k < end; k++) {
+    const rm_lid   n     = neighbour[k];
+    const double  *there = n < cells ? own + n * stride : halo + (n - cells) * stride, *weight = stencil->wide_weight[k];
+    const rm_lanes rise  = scale * rm_lanes_at(there) - value;
+
+    for (int i = 0; i < 9; i++) sum[i] += rm_lanes_of(weight[i]) * rise;
+  }
+  for (int i = 0; i < 9; i++) fit[i] = sum[i];
+}
+
+/* That of one field, its coefficients in twos; second lanes of fit[] are not set. */
+static void fit_alone(const rm_stencil *stencil, rm_lid cell, const rm_around *u, rm_lanes fit[9])
 {
   const double    value = rm_value_at(u, stencil->num_cells, cell);
   const rm_around near  = *u; /* this and the sums are copies: no write in the loop can change them */
-  rm_lanes        xy = rm_lanes_of(0.0), z_xx = xy, yy_zz = xy, xy_xz = xy; /* coefficients in twos, and the last one: */
-  double          yz      = 0.0;
-  bool            is_good = !stencil->is_reduced[cell];
+  rm_lanes        two[4];
+  double          last = 0.0;
 
-  for (int k = 0; k < 7; k++) curvature[k] = 0.0;
-  if (!is_good) return false;
+  for (int i = 0; i < 4; i++) two[i] = rm_lanes_of(0.0);
   for (int64_t k = stencil->wide_offset[cell], end = stencil->wide_offset[cell + 1]; k < end; k++) {
     const double  *weight = stencil->wide_weight[k];
     const double   rise   = rm_value_at(&near, stencil->num_cells, stencil->wide_neighbour[k]) - value;
     const rm_lanes both   = rm_lanes_of(rise);
 
-    xy += rm_lanes_at(weight) * both;
-    z_xx += rm_lanes_at(weight + 2) * both;
-    yy_zz += rm_lanes_at(weight + 4) * both;
-    xy_xz += rm_lanes_at(weight + 6) * both;
-    yz += weight[8] * rise;
+    for (int i = 0; i < 4; i++) two[i] += rm_lanes_at(weight + 2 * i) * both;
+    last += weight[8] * rise;
   }
-  const double fit[9] = {xy[0], xy[1], z_xx[0], z_xx[1], yy_zz[0], yy_zz[1], xy_xz[0], xy_xz[1], yz};
-  for (int i = 0; i < 9; i++) is_good = is_good && rm_is_finite(fit[i]);
-  if (!is_good) return false;
-  for (int i = 0; i < 3; i++) slope[i] = fit[i];
-  for (int i = 0; i < 6; i++) curvature[i] = fit[3 + i];
-  curvature[6] = -rm_dot6(curvature, stencil->spread[cell]);
-  return true;
+  for (int i = 0; i < 8; i++) fit[i] = rm_lanes_of(two[i / 2][i % 2]);
+  fit[8] = rm_lanes_of(last);
+}
+
+unsigned rm_fit_quadratic(const rm_stencil *stencil, rm_lid cell, const rm_around *u, int num, double *slope,
+                          double *curvature)
+{
+  const double *spread = stencil->spread[cell];
+  unsigned      found  = 0;
+
+  for (int f = 0; f < num; f += 2) {
+    const rm_around here = {u->own + f, u->halo ? u->halo + f : NULL, u->stride};
+    const int       left = num - f;
+    rm_lanes        fit[9], constant = rm_lanes_of(0.0);
+    rm_flags        is_good = {0, 0};
+
+    for (int i = 0; i < 9; i++) fit[i] = rm_lanes_of(0.0);
+    if (!stencil->is_reduced[cell]) {
+      if (left > 1)
+        fit_two(stencil, cell, &here, fit);
+      else
+        fit_alone(stencil, cell, &here, fit);
+      is_good = rm_lanes_finite(fit[0], fit[1], fit[2]) & rm_lanes_finite(fit[3], fit[4], fit[5]) &
+                rm_lanes_finite(fit[6], fit[7], fit[8]);
+    }
+    for (int i = 0; i < 9; i++) {
+      fit[i] = (rm_lanes)((rm_flags)fit[i] & is_good);
+      rm_lanes_put(fit[i], left, (i < 3 ? slope + i * num : curvature + (i - 3) * num) + f);
+    }
+    for (int i = 0; i < 6; i++) constant -= fit[3 + i] * rm_lanes_of(spread[i]);
+    rm_lanes_put(constant, left, curvature + 6 * num + f);
+    for (int i = 0; i < 2 && i < left; i++) found |= is_good[i] ? 1u << (f + i) : 0u;
+  }
+  return found;
 }

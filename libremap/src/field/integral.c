@@ -30,18 +30,20 @@ void rm_integral_source(const rm_profile *w, const rm_rows *back, const rm_packi
   for (int f = 0; f < num; f++) {
     if (packing->fields[f].nature == REMAP_FLAG) continue;
     for (rm_lid c = 0; c < mesh->num_cells; c++) {
-      const double *place   = w->pack + (int64_t)c * packing->width + packing->at[f];
+      const double *place   = rm_pack_of(w, packing, c);
       const double  amount  = rm_system_amount(packing, f, w->given + (int64_t)c * num, w->number + (int64_t)c * num);
       const double  measure = w->ground.measure && rm_is_amount(packing, f) ? w->ground.measure[c] : 1.0;
       const double  value = RM_VALUE_SCALE * amount * measure, volume = mesh->cell_volume[c];
-      const double *slope     = packing->degree[f] > 0 ? place + RM_PACK_SLOPE : NULL;
-      const double *curvature = packing->degree[f] > 1 ? place + rm_pack_curvature(packing->has_bounds) : NULL;
+      double        slope[3], curvature[7];
 
       if (rows->cover[c] == REMAP_COVERED) {
         rm_integral_add(&integral[f].source, value, volume);
         rm_integral_add(&integral[f].magnitude, fabs(value), fabs(volume));
       } else if (rows->cover[c] == REMAP_PARTIAL) {
-        add_partial(&w->ground, back, c, value, slope, curvature, &integral[f]);
+        if (packing->degree[f] > 0) rm_pack_read(packing, f, place, RM_PACK_SLOPE, 3, slope);
+        if (packing->degree[f] > 1) rm_pack_read(packing, f, place, rm_pack_curvature(packing->has_bounds), 7, curvature);
+        add_partial(&w->ground, back, c, value, packing->degree[f] > 0 ? slope : NULL,
+                    packing->degree[f] > 1 ? curvature : NULL, &integral[f]);
       }
     }
   }

@@ -33,6 +33,23 @@ static inline void rm_lanes_put(rm_lanes lanes, int num, double *x) /* the first
 }
 static inline rm_lanes rm_lanes_of(double x) { return (rm_lanes){x, x}; }
 
+/* Upper halves of two numbers next to each other, which tell them to 21 bits: from there as numbers, and to there, rounded. */
+static inline rm_lanes rm_lanes_from_halves(const uint32_t *half)
+{
+#ifdef __SSE2__
+  return (rm_lanes)_mm_unpacklo_epi32(_mm_setzero_si128(), _mm_loadl_epi64((const __m128i *)(const void *)half));
+#else
+  return (rm_lanes)((rm_flags){half[0], half[1]} << 32);
+#endif
+}
+static inline void rm_lanes_put_halves(rm_lanes lanes, int num, uint32_t *half) /* the first one only if num is 1 */
+{
+  const rm_flags bits = (rm_flags)lanes + ((rm_flags){1, 1} << 31);
+
+  half[0] = (uint32_t)((uint64_t)bits[0] >> 32);
+  if (num > 1) half[1] = (uint32_t)((uint64_t)bits[1] >> 32);
+}
+
 /* a where it is less (greater) than b, else b: so what is no number in a counts nowhere. */
 static inline rm_lanes rm_lanes_least(rm_lanes a, rm_lanes b)
 {

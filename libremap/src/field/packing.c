@@ -42,6 +42,7 @@ rm_load rm_load_of(const rm_transfer_setup *setup, const remap_transfer *how, in
     load.is_curved |= is_sloped && fields[f].system > 0;
     load.is_settled |= is_sloped && how->limiter == REMAP_LIMITER_CAAS;
     load.is_checked |= is_sloped && how->limiter == REMAP_LIMITER_AUTO;
+    load.keeps_bounds |= is_sloped && how->limiter == REMAP_LIMITER_AUTO && !has_bounds;
     load.is_blended |= rm_is_blended(setup, how, &fields[f]);
     load.has_nearest |= setup->any_uncovered && rm_needs_nearest(how, &fields[f]);
   }
@@ -58,6 +59,7 @@ rm_load rm_load_max(rm_load a, rm_load b)
                    .has_slopes  = a.has_slopes || b.has_slopes,
                    .is_settled  = a.is_settled || b.is_settled,
                    .is_checked  = a.is_checked || b.is_checked,
+                   .keeps_bounds = a.keeps_bounds || b.keeps_bounds,
                    .is_wide     = a.is_wide || b.is_wide,
                    .is_curved   = a.is_curved || b.is_curved,
                    .is_blended  = a.is_blended || b.is_blended,
@@ -67,7 +69,8 @@ rm_load rm_load_max(rm_load a, rm_load b)
 bool rm_load_covers(rm_load a, rm_load b)
 {
   return a.num_fields >= b.num_fields && a.width >= b.width && a.num_systems >= b.num_systems && a.has_slopes >= b.has_slopes &&
-         a.is_settled >= b.is_settled && a.is_checked >= b.is_checked && a.is_wide >= b.is_wide && a.is_curved >= b.is_curved &&
+         a.is_settled >= b.is_settled && a.is_checked >= b.is_checked &&
+         a.keeps_bounds >= b.keeps_bounds && a.is_wide >= b.is_wide && a.is_curved >= b.is_curved &&
          a.is_blended >= b.is_blended && a.has_nearest >= b.has_nearest;
 }
 
@@ -92,6 +95,16 @@ static void find_spans(rm_packing *p)
   }
 }
 
+/* Give num fields from f on, which are alike, their places, behind those before. */
+static void lay_out(rm_packing *p, int f, int num)
+{
+  for (int i = 0; i < num; i++) {
+    p->at[f + i]   = p->width + i;
+    p->step[f + i] = num;
+  }
+  p->width += num * rm_pack_width(p->degree[f], p->has_bounds);
+}
+
 void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_transfer *how, int num_fields,
                      const remap_field_desc *fields)
 {
@@ -105,9 +118,13 @@ void rm_packing_fill(rm_packing *p, const rm_transfer_setup *setup, const remap_
   for (int f = 0; f < num_fields; f++) {
     p->order[f]  = rm_has_slope(how, &fields[f]) ? how->order : 1;
     p->degree[f] = rm_degree(how, &fields[f]);
-    p->at[f]     = p->width;
-    p->width += rm_pack_width(p->degree[f], p->has_bounds);
   }
   rm_systems_find(p);
   find_spans(p);
+  for (int f = 0, i = 0; f < num_fields; f++) { /* flags stand alone, between spans */
+    const bool is_span = i < p->num_spans && p->span[i].first == f;
+
+    lay_out(p, f, is_span ? p->span[i].num : 1);
+    if (is_span) f += p->span[i++].num - 1;
+  }
 }

@@ -1,6 +1,7 @@
 /* profile -- the fields of one mesh reconstructed, with the messages that this takes: numbers around the stencils; for the
  * limiter auto slopes, then which cells are rough, thrice; with systems a reduction over all ranks. O(neighbours) per cell and
- * field; 16 to 56 bytes per cell and field, 64 more for auto, 56 more for polynomials of degree 2. */
+ * field; 8 to 48 bytes per cell and field in the pack, 56 more for polynomials of degree 2; for auto 16 more, and another 16
+ * unless bounds travel. */
 #include "field_private.h"
 
 void rm_word_add(rm_word *word, remap_status status)
@@ -58,6 +59,21 @@ static void mark_halo_cells(const rm_stencil *stencil, uint8_t *needs_halo)
   }
 }
 
+/* What it takes to tell smooth cells from others. */
+static remap_status make_smoothing(rm_arena *arena, int stream, const rm_load *load, rm_profile *p)
+{
+  const rm_plan *plan = p->ground.stencil->plan;
+  const int64_t  n = load->num_fields, cells = p->ground.mesh->num_cells, words = rm_rough_words(load->num_fields);
+
+  RM_TRY(rm_flow_init(arena, plan, stream, 4 * (size_t)n * sizeof *p->shown, &p->slopes));
+  RM_TRY(rm_flow_init(arena, plan, stream, (size_t)words * sizeof *p->rough, &p->roughs));
+  RM_NEW(p->shown, arena, rm_add_sat(rm_mul_sat(4 * n, cells), 1)); /* one more, here and below: lanes.h */
+  RM_NEW(p->rough, arena, rm_mul_sat(words, cells));
+  RM_NEW(p->spread, arena, rm_mul_sat(words, cells));
+  if (load->keeps_bounds) RM_NEW(p->bounds, arena, rm_add_sat(rm_mul_sat(2 * n, cells), 1));
+  return REMAP_OK;
+}
+
 remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, rm_profile *p)
 {
   const rm_lid   cells = p->ground.mesh->num_cells;
@@ -66,22 +82,15 @@ remap_status rm_profile_init(rm_arena *arena, int stream, const rm_load *load, r
   const rm_plan *plan  = load->has_slopes ? p->ground.stencil->plan : NULL;
 
   RM_NEW0(p->needs_halo, arena, cells);
-  RM_NEW(p->pack, arena, rm_mul_sat(cells, load->width));
   RM_NEW(p->limited, arena, 2 * (int64_t)n);
   RM_NEW0(p->extreme, arena, 2 * (int64_t)n);
-  RM_NEW(p->line, arena, 7 * (int64_t)n + 1);
+  RM_NEW(p->line, arena, 7 * (int64_t)n + 1); /* one more: lanes.h */
+  RM_NEW(p->is_made, arena, n);
   if (load->has_slopes) {
     RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->halo));
     mark_halo_cells(p->ground.stencil, p->needs_halo);
   }
-  if (!load->is_checked) return REMAP_OK;
-  RM_TRY(rm_flow_init(arena, plan, stream, 4 * bytes, &p->slopes));
-  RM_TRY(rm_flow_init(arena, plan, stream, bytes, &p->roughs));
-  RM_NEW(p->slope, arena, rm_add_sat(rm_mul_sat(4 * (int64_t)cells, n), 1)); /* one more: lanes.h */
-  RM_NEW(p->bounds, arena, rm_mul_sat(2 * (int64_t)cells, n));
-  RM_NEW(p->rough, arena, rm_mul_sat(cells, n));
-  RM_NEW(p->spread, arena, rm_mul_sat(cells, n));
-  return REMAP_OK;
+  return load->is_checked ? make_smoothing(arena, stream, load, p) : REMAP_OK;
 }
 
 bool rm_profile_reads_halo(const rm_packing *packing)
@@ -92,13 +101,6 @@ bool rm_profile_reads_halo(const rm_packing *packing)
   return reads;
 }
 
-const double *rm_profile_gives(const rm_profile *p, const rm_packing *packing)
-{
-  const bool is_bare = packing->width == packing->num_fields && packing->num_systems == 0 && !p->ground.measure;
-
-  return is_bare ? p->given : p->pack;
-}
-
 void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
   const size_t bytes = (size_t)packing->num_fields * sizeof(double);
@@ -106,32 +108,27 @@ void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packi
   for (int f = 0; f < 2 * packing->num_fields; f++) p->limited[f] = 0;
   if (rm_profile_reads_halo(packing)) {
     rm_word_post(word, comm, &p->halo, bytes, p->number);
-  } else if (word->note.status == REMAP_OK && rm_profile_gives(p, packing) == p->pack) {
-    rm_reconstruct(p, packing, 0);
-    rm_reconstruct(p, packing, 1);
+  } else if (word->note.status == REMAP_OK) {
+    rm_reconstruct(p, packing, 0, RM_FINISH);
+    rm_reconstruct(p, packing, 1, RM_FINISH);
   }
 }
 
 /* Tell smooth cells from others: slopes of all around, then roughness, layer after layer. */
 static void find_smooth(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
-  const rm_stencil *stencil = p->ground.stencil;
-  const size_t      bytes   = (size_t)packing->num_fields * sizeof(double);
-  const rm_numbers  numbers = {p->number, rm_flow_numbers(&p->halo)};
+  const int words = rm_rough_words(packing->num_fields);
 
-  if (word->note.status == REMAP_OK) rm_smooth_slopes(stencil, packing, numbers, p->slope, p->bounds);
-  rm_word_post(word, comm, &p->slopes, 4 * bytes, p->slope);
+  rm_word_post(word, comm, &p->slopes, 4 * (size_t)packing->num_fields * sizeof *p->shown, p->shown);
   rm_word_await(word, comm, &p->slopes);
-  if (word->note.status == REMAP_OK)
-    rm_smooth_roughness(stencil, p->ground.mesh, packing, numbers, (rm_numbers){p->slope, rm_flow_numbers(&p->slopes)},
-                        p->rough);
+  if (word->note.status == REMAP_OK) rm_smooth_roughness(p, packing, p->rough);
   for (int layer = 0; layer < RM_ROUGH_LAYERS; layer++) {
-    double *const before = p->rough;
+    uint64_t *const before = p->rough;
 
-    rm_word_post(word, comm, &p->roughs, bytes, p->rough);
+    rm_word_post(word, comm, &p->roughs, (size_t)words * sizeof *p->rough, p->rough);
     rm_word_await(word, comm, &p->roughs);
     if (word->note.status == REMAP_OK)
-      rm_smooth_spread(&p->ground, p->needs_halo, packing, (rm_numbers){p->rough, rm_flow_numbers(&p->roughs)}, p->spread);
+      rm_smooth_spread(p, words, p->rough, (const uint64_t *)(const void *)p->roughs.received, p->spread);
     if (layer + 1 == RM_ROUGH_LAYERS) break;
     p->rough  = p->spread;
     p->spread = before;
@@ -159,15 +156,18 @@ static void find_extremes(rm_profile *p, const rm_comm *comm, const rm_packing *
 
 void rm_profile_finish(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
-  const bool waits = packing->is_checked || packing->num_systems > 0; /* no cell is ready before its neighbours are looked at */
+  const bool waits = packing->is_checked || packing->num_systems > 0; /* no cell is finished before all are looked at */
+  const int  steps = waits ? RM_FIT : RM_FIT | RM_FINISH;
 
   if (!rm_profile_reads_halo(packing)) return;
-  if (word->note.status == REMAP_OK && !waits) rm_reconstruct(p, packing, 0);
+  if (word->note.status == REMAP_OK) rm_reconstruct(p, packing, 0, steps);
   rm_word_await(word, comm, &p->halo);
+  if (word->note.status == REMAP_OK) rm_reconstruct(p, packing, 1, steps);
   if (packing->is_checked) find_smooth(p, comm, packing, word);
   if (packing->num_systems > 0) find_extremes(p, comm, packing, word);
-  if (word->note.status == REMAP_OK && waits) rm_reconstruct(p, packing, 0);
-  if (word->note.status == REMAP_OK) rm_reconstruct(p, packing, 1);
+  if (word->note.status != REMAP_OK || !waits) return;
+  rm_reconstruct(p, packing, 0, RM_FINISH);
+  rm_reconstruct(p, packing, 1, RM_FINISH);
 }
 
 void rm_profile_abandon(rm_profile *p, const rm_comm *comm, rm_word *word) { rm_word_await(word, comm, &p->halo); }

@@ -28,20 +28,26 @@ typedef struct row_sums {
   double magnitude; /* of |V|       */
 } row_sums;
 
-/* What one giver sent for a field. */
+/* What one giver sent for a field with slopes. */
 typedef struct giver_view {
-  double        value;     /* scaled                                            */
-  const double *slope;     /* scaled; behind it the bounds, if there are any    */
-  const double *curvature; /* scaled, and its constant; NULL below degree 2     */
+  double value;                    /* scaled, as all that follows          */
+  double slope[3], curvature[7];   /* the latter only of degree 2; its constant is behind it */
 } giver_view;
 
-static giver_view view(const rm_receipt *w, int f, rm_lid giver)
+static void view(const rm_receipt *w, int f, rm_lid giver, giver_view *out)
 {
-  static const double no_slope[3] = {0.0, 0.0, 0.0};
-  const double       *place       = w->got + (int64_t)giver * w->packing->width + w->packing->at[f];
+  const rm_packing *p     = w->packing;
+  const double     *place = w->got + (int64_t)giver * p->width;
 
-  return (giver_view){RM_VALUE_SCALE * place[0], w->packing->degree[f] > 0 ? place + RM_PACK_SLOPE : no_slope,
-                      w->packing->degree[f] > 1 ? place + rm_pack_curvature(w->packing->has_bounds) : NULL};
+  out->value = RM_VALUE_SCALE * place[p->at[f]];
+  rm_pack_read(p, f, place, RM_PACK_SLOPE, 3, out->slope);
+  if (p->degree[f] > 1) rm_pack_read(p, f, place, rm_pack_curvature(p->has_bounds), 7, out->curvature);
+}
+
+/* Its value alone. */
+static double value_of(const rm_receipt *w, int f, rm_lid giver)
+{
+  return RM_VALUE_SCALE * w->got[(int64_t)giver * w->packing->width + w->packing->at[f]];
 }
 
 /* What all fields share. Volumes are summed in row order, with compensation. */
@@ -89,20 +95,20 @@ static double plain_mean(const rm_receipt *w, int f, rm_lid cell, const row_sums
   const rm_rows *rows = w->setup->rows;
   double         sum  = 0.0;
 
-  if (!(s->magnitude > 0.0)) return view(w, f, rows->giver[rows->offset[cell]]).value;
+  if (!(s->magnitude > 0.0)) return value_of(w, f, rows->giver[rows->offset[cell]]);
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++)
-    sum += view(w, f, rows->giver[k]).value * (fabs(rows->volume[k]) / s->magnitude);
+    sum += value_of(w, f, rows->giver[k]) * (fabs(rows->volume[k]) / s->magnitude);
   return sum;
 }
 
 /* The mean of a giver's polynomial over a cell that may lie beyond the giver. */
-static double mean_beyond(const rm_receipt *w, const giver_view *g, const double giver_centroid[3], rm_lid cell)
+static double mean_beyond(const rm_receipt *w, int f, const giver_view *g, const double giver_centroid[3], rm_lid cell)
 {
   const double *x    = w->setup->receiving->cell_centroid[cell];
   const double  y[3] = {x[0] - giver_centroid[0], x[1] - giver_centroid[1], x[2] - giver_centroid[2]};
   const double  mean = g->value + (g->slope[0] * y[0] + g->slope[1] * y[1] + g->slope[2] * y[2]);
 
-  if (!g->curvature) return mean;
+  if (w->packing->degree[f] < 2) return mean;
   return mean + (rm_form(g->curvature, y, y) + g->curvature[6] +
                  rm_dot6(g->curvature, w->setup->receiving_second[cell]) / w->setup->receiving->cell_volume[cell]);
 }
@@ -114,9 +120,10 @@ static double mean_taken_beyond(const rm_receipt *w, int f, rm_lid cell, const r
   rm_compensated sum  = {0.0, 0.0};
 
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const giver_view g = view(w, f, rows->giver[k]);
+    giver_view g;
 
-    rm_compensated_add(&sum, mean_beyond(w, &g, rows->giver_centroid[rows->giver[k]], cell) * rows->volume[k]);
+    view(w, f, rows->giver[k], &g);
+    rm_compensated_add(&sum, mean_beyond(w, f, &g, rows->giver_centroid[rows->giver[k]], cell) * rows->volume[k]);
   }
   return rm_compensated_value(&sum) / s->volume;
 }
@@ -137,8 +144,9 @@ static double normalised(const rm_receipt *w, int f, rm_lid cell, const row_sums
   mean = mean_taken_beyond(w, f, cell, s);
   if (!w->packing->has_bounds || w->packing->order[f] < 2) return mean;
   for (int64_t k = rows->offset[cell]; k < rows->offset[cell + 1]; k++) {
-    const double *bounds = view(w, f, rows->giver[k]).slope + RM_PACK_BOUNDS - RM_PACK_SLOPE;
+    double bounds[2];
 
+    rm_pack_read(w->packing, f, w->got + (int64_t)rows->giver[k] * w->packing->width, RM_PACK_BOUNDS, 2, bounds);
     least    = fmin(least, bounds[0]);
     greatest = fmax(greatest, bounds[1]);
   }
@@ -161,14 +169,15 @@ static void add_kept(const rm_receipt *w, int f, rm_lid cell, double old, const 
   const rm_mesh *mesh   = w->setup->receiving;
   const double   volume = mesh->cell_volume[cell] - s->volume;
   rm_compensated sum    = {0.0, 0.0};
-  const double  *at, *g, *h;
+  const double  *place;
+  double         g[3], h[7];
 
   *content += RM_VALUE_SCALE * old * volume;
   if (!w->keeping || w->packing->degree[f] == 0 || !rm_is_blended(w->setup, w->how, &w->fields[f])) return;
-  at = w->keeping->pack + (int64_t)cell * w->packing->width + w->packing->at[f];
-  g  = at + RM_PACK_SLOPE;
-  h  = at + rm_pack_curvature(w->packing->has_bounds);
+  place = rm_pack_of(w->keeping, w->packing, cell);
+  rm_pack_read(w->packing, f, place, RM_PACK_SLOPE, 3, g);
   if (w->packing->degree[f] > 1) {
+    rm_pack_read(w->packing, f, place, rm_pack_curvature(w->packing->has_bounds), 7, h);
     rm_compensated_add(&sum, rm_dot6(h, w->setup->receiving_second[cell]));
     rm_compensated_add(&sum, h[6] * volume);
   }
@@ -302,7 +311,7 @@ static void keep_system(const rm_receipt *w, int system, rm_lid cell, const row_
   }
   if (w->keeping) {
     rm_limits_clear(p, limits);
-    rm_limits_add(p, w->keeping->pack + (int64_t)cell * p->width, limits);
+    rm_limits_add(p, rm_pack_of(w->keeping, p, cell), limits);
     factor = rm_admit_factor(p, system, kept, change, volume, limits, 0x1p-44);
   }
   for (int f = 0; f < num; f++) kept[f] += factor * change[f];

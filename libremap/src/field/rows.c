@@ -43,67 +43,108 @@ RM_UNROLLED void add_values(const run *r, int num, double *content)
   for (int t = 0; t < twos; t++) rm_lanes_put(sum[t], num - 2 * t, content + 2 * t);
 }
 
-/* Likewise of fields with slopes, `stride` apart. */
-RM_UNROLLED void add_slopes(const run *r, int num, int64_t stride, double *content)
-{
-  const rm_lid *giver      = r->rows->giver;
-  const double *volume     = r->rows->volume;
-  const double(*moment)[3] = r->rows->moment;
-  rm_lanes low[MOST], high[MOST];
-
-  for (int f = 0; f < num; f++) low[f] = high[f] = rm_lanes_of(0.0);
-  for (int64_t k = r->first; k < r->end; k++) {
-    const double  *place  = r->got + giver[k] * r->width;
-    const rm_lanes by_low = {RM_VALUE_SCALE * volume[k], moment[k][0]}, by_high = rm_lanes_at(moment[k] + 1);
-
-    if (num > 1) fetch_ahead(r, k, num * stride);
-    for (int f = 0; f < num; f++) {
-      low[f] += rm_lanes_at(place + f * stride) * by_low;
-      high[f] += rm_lanes_at(place + f * stride + 2) * by_high;
-    }
-  }
-  for (int f = 0; f < num; f++) content[f] = low[f][0] + (low[f][1] + (high[f][0] + high[f][1]));
-}
-
-/* Likewise of fields with curvature, which stands `beyond` the value. */
-RM_UNROLLED void add_curvatures(const run *r, int num, int64_t stride, int beyond, double *content)
+/* Likewise of one field with slopes, which stand beside the value. */
+RM_UNROLLED void add_slope(const run *r, double *content)
 {
   const rm_rows *rows = r->rows;
-  rm_lanes       low[MOST], high[MOST], form[MOST];
+  rm_lanes       low = rm_lanes_of(0.0), high = low;
 
-  for (int f = 0; f < num; f++) low[f] = high[f] = form[f] = rm_lanes_of(0.0);
   for (int64_t k = r->first; k < r->end; k++) {
-    const double  *place = r->got + rows->giver[k] * r->width, *m = rows->moment[k], *s = rows->second[k];
-    const double   volume = rows->volume[k];
-    const rm_lanes by_low = {RM_VALUE_SCALE * volume, m[0]}, by_high = rm_lanes_at(m + 1);
-    const rm_lanes second[3] = {rm_lanes_at(s), rm_lanes_at(s + 2), rm_lanes_at(s + 4)};
+    const double  *place = r->got + rows->giver[k] * r->width, *m = rows->moment[k];
+    const rm_lanes by_low = {RM_VALUE_SCALE * rows->volume[k], m[0]};
 
-    fetch_ahead(r, k, num * stride);
-    for (int f = 0; f < num; f++) {
-      const double  *u = place + f * stride, *h = u + beyond;
-      const rm_lanes constant = {h[6] * volume, 0.0};
-
-      low[f] += rm_lanes_at(u) * by_low;
-      high[f] += rm_lanes_at(u + 2) * by_high;
-      form[f] += ((rm_lanes_at(h) * second[0] + rm_lanes_at(h + 2) * second[1]) + rm_lanes_at(h + 4) * second[2]) + constant;
-    }
+    low += rm_lanes_at(place) * by_low;
+    high += rm_lanes_at(place + 2) * rm_lanes_at(m + 1);
   }
-  for (int f = 0; f < num; f++) content[f] = low[f][0] + ((low[f][1] + (high[f][0] + high[f][1])) + (form[f][0] + form[f][1]));
+  content[0] = low[0] + (low[1] + (high[0] + high[1]));
+}
+
+/* Likewise of num fields: rows of values and slopes are side by side. */
+RM_UNROLLED void add_slopes(const run *r, int num, double *content)
+{
+  const rm_rows *rows = r->rows;
+  const int      twos = (num + 1) / 2;
+  rm_lanes       sum[4][MOST / 2];
+
+  for (int i = 0; i < 4; i++)
+    for (int t = 0; t < twos; t++) sum[i][t] = rm_lanes_of(0.0);
+  for (int64_t k = r->first; k < r->end; k++) {
+    const double  *place = r->got + rows->giver[k] * r->width, *m = rows->moment[k];
+    const rm_lanes by[4] = {rm_lanes_of(RM_VALUE_SCALE * rows->volume[k]), rm_lanes_of(m[0]), rm_lanes_of(m[1]),
+                            rm_lanes_of(m[2])};
+
+    fetch_ahead(r, k, num * 4);
+    for (int i = 0; i < 4; i++)
+      for (int t = 0; t < twos; t++) sum[i][t] += rm_lanes_at(place + i * num + 2 * t) * by[i];
+  }
+  for (int t = 0; t < twos; t++)
+    rm_lanes_put(sum[0][t] + (sum[1][t] + (sum[2][t] + sum[3][t])), num - 2 * t, content + 2 * t);
+}
+
+/* Likewise of one field with curvature, which stands `beyond` the value. */
+RM_UNROLLED void add_curvature(const run *r, int beyond, double *content)
+{
+  const rm_rows *rows = r->rows;
+  rm_lanes       low = rm_lanes_of(0.0), high = low, form = low;
+
+  for (int64_t k = r->first; k < r->end; k++) {
+    const double  *u = r->got + rows->giver[k] * r->width, *h = u + beyond, *m = rows->moment[k], *s = rows->second[k];
+    const rm_lanes by_low = {RM_VALUE_SCALE * rows->volume[k], m[0]}, constant = {h[6] * rows->volume[k], 0.0};
+
+    fetch_ahead(r, k, beyond + 7);
+    low += rm_lanes_at(u) * by_low;
+    high += rm_lanes_at(u + 2) * rm_lanes_at(m + 1);
+    form += ((rm_lanes_at(h) * rm_lanes_at(s) + rm_lanes_at(h + 2) * rm_lanes_at(s + 2)) +
+             rm_lanes_at(h + 4) * rm_lanes_at(s + 4)) +
+            constant;
+  }
+  content[0] = low[0] + ((low[1] + (high[0] + high[1])) + (form[0] + form[1]));
+}
+
+/* Likewise of num fields, two after two; even and odd coefficients of the form are summed apart. */
+RM_UNROLLED void add_curvatures(const run *r, int num, int beyond, double *content)
+{
+  const rm_rows *rows = r->rows;
+
+  for (int t = 0; t < (num + 1) / 2; t++) {
+    rm_lanes sum[4], even = rm_lanes_of(0.0), odd = even;
+
+    for (int i = 0; i < 4; i++) sum[i] = rm_lanes_of(0.0);
+    for (int64_t k = r->first; k < r->end; k++) {
+      const double  *u = r->got + rows->giver[k] * r->width + 2 * t, *h = u + beyond * num;
+      const double  *m = rows->moment[k], *s = rows->second[k];
+      const rm_lanes volume = rm_lanes_of(rows->volume[k]);
+
+      if (t == 0) fetch_ahead(r, k, (beyond + 7) * num);
+      sum[0] += rm_lanes_at(u) * (volume * rm_lanes_of(RM_VALUE_SCALE));
+      for (int i = 0; i < 3; i++) sum[i + 1] += rm_lanes_at(u + (i + 1) * num) * rm_lanes_of(m[i]);
+      even += ((rm_lanes_at(h) * rm_lanes_of(s[0]) + rm_lanes_at(h + 2 * num) * rm_lanes_of(s[2])) +
+               rm_lanes_at(h + 4 * num) * rm_lanes_of(s[4])) +
+              rm_lanes_at(h + 6 * num) * volume;
+      odd += (rm_lanes_at(h + num) * rm_lanes_of(s[1]) + rm_lanes_at(h + 3 * num) * rm_lanes_of(s[3])) +
+             rm_lanes_at(h + 5 * num) * rm_lanes_of(s[5]);
+    }
+    rm_lanes_put(sum[0] + ((sum[1] + (sum[2] + sum[3])) + (even + odd)), num - 2 * t, content + 2 * t);
+  }
 }
 
 /* Any of these; num is a constant where this is called, so that each case gets loops of its own. */
-RM_UNROLLED void add_run(const run *r, int degree, int num, int64_t stride, int beyond, double *content)
+RM_UNROLLED void add_run(const run *r, int degree, int num, int beyond, double *content)
 {
   if (degree == 0)
     add_values(r, num, content);
+  else if (degree == 1 && num == 1)
+    add_slope(r, content);
   else if (degree == 1)
-    add_slopes(r, num, stride, content);
+    add_slopes(r, num, content);
+  else if (num == 1)
+    add_curvature(r, beyond, content);
   else
-    add_curvatures(r, num, stride, beyond, content);
+    add_curvatures(r, num, beyond, content);
 }
 
 /* Runs of a long row, with compensation between them. */
-RM_UNROLLED void add_runs(const run *row, int degree, int num, int64_t stride, int beyond, double *content)
+RM_UNROLLED void add_runs(const run *row, int degree, int num, int beyond, double *content)
 {
   rm_compensated total[MOST] = {{0.0, 0.0}};
 
@@ -111,7 +152,7 @@ RM_UNROLLED void add_runs(const run *row, int degree, int num, int64_t stride, i
     const run r = {row->rows, row->got, row->width, first, row->end - first > RUN ? first + RUN : row->end, row->last};
     double    part[MOST];
 
-    add_run(&r, degree, num, stride, beyond, part);
+    add_run(&r, degree, num, beyond, part);
     for (int f = 0; f < num; f++) rm_compensated_add(&total[f], part[f]);
   }
   for (int f = 0; f < num; f++) content[f] = rm_compensated_value(&total[f]);
@@ -129,16 +170,16 @@ typedef struct patch {
 RM_UNROLLED void sum_patch(const patch *w, int degree, int num, double *content)
 {
   const rm_packing *p      = w->packing;
-  const int64_t    *offset = w->rows->offset, stride = rm_pack_width(degree, p->has_bounds);
+  const int64_t    *offset = w->rows->offset;
   const int         beyond = rm_pack_curvature(p->has_bounds);
 
   for (rm_lid c = w->first; c < w->end; c++, content += p->num_fields) {
     const run row = {w->rows, w->got, p->width, offset[c], offset[c + 1], offset[w->rows->num_cells] - 1};
 
     if (row.end - row.first <= RUN)
-      add_run(&row, degree, num, stride, beyond, content);
+      add_run(&row, degree, num, beyond, content);
     else
-      add_runs(&row, degree, num, stride, beyond, content);
+      add_runs(&row, degree, num, beyond, content);
   }
 }
 

@@ -12,7 +12,10 @@
  * however small the jump. A cell is smooth if no cell within three layers of neighbours is rougher than a threshold below that:
  * a jump of one and a half cells before a wall looks linear from the wall, and is rough only on its far side.
  *
- * Slopes and ranges of other ranks' cells come in one exchange, roughness in three. O(neighbours) per cell and field. */
+ * The question needs few digits: slopes and ranges are looked at to 21 bits, so that those of a cell's neighbours take half the
+ * memory. In slender cells that are oblique to the axes what a slope across adds along them is wrong by as much: up to aspect
+ * ratios of 10^5 that is no roughness. Other ranks' come in one exchange, roughness in three. O(neighbours) per cell and field.
+ */
 #include "field_private.h"
 #include "lanes.h"
 
@@ -20,106 +23,112 @@
 
 static const double ROUGH = 0.2;
 
-void rm_smooth_slopes(const rm_stencil *stencil, const rm_packing *packing, rm_numbers given, double *slope, double *bounds)
+enum { TWOS = RM_SPAN_FIELDS / 2 };
+
+void rm_smooth_show(const rm_profile *w, const rm_packing *p, const rm_span *span, rm_lid cell)
 {
-  const int num = packing->num_fields;
+  const int     num    = span->num;
+  const double *slope  = rm_pack_of(w, p, cell) + p->at[span->first] + RM_PACK_SLOPE * num;
+  const double *bounds = rm_bounds_of(w, p, span, cell);
+  uint32_t     *to     = w->shown + ((int64_t)cell * p->num_fields + span->first) * 4;
 
-  for (rm_lid c = 0; c < stencil->num_cells; c++, slope += 4 * num, bounds += 2 * num) {
-    rm_fit_slopes(stencil, packing, c, given, (rm_fit){slope, bounds});
-    for (int f = 0; f < num; f++) {
-      const rm_around u = rm_around_of(given, f, num);
-      double          g[3], curvature[7];
-
-      if (packing->order[f] < 2) continue;
-      slope[3 * num + f] = bounds[num + f] - bounds[f];
-      if (packing->order[f] < 3 || !rm_fit_quadratic(stencil, c, &u, g, curvature)) continue;
-      for (int d = 0; d < 3; d++) slope[d * num + f] = g[d];
-    }
+  for (int f = 0; f < num; f += 2) {
+    for (int d = 0; d < 3; d++) rm_lanes_put_halves(rm_lanes_at(slope + d * num + f), num - f, to + d * num + f);
+    rm_lanes_put_halves(rm_lanes_at(bounds + num + f) - rm_lanes_at(bounds + f), num - f, to + 3 * num + f);
   }
 }
 
-enum { TWOS = RM_SPAN_FIELDS / 2 };
-
-/* Errors and ranges of one cell in 2 twos fields, of which the first one's numbers are at u and slopes at g. */
-RM_UNROLLED void errors_of_twos(const rm_stencil *stencil, const rm_mesh *mesh, rm_lid cell, int twos, const rm_around *u,
-                                const rm_around *g, rm_lanes error[TWOS], rm_lanes range[TWOS])
+/* Which of the num fields of a span are rough in a cell; twos, half of num, rounded up, is a constant where this is called. */
+RM_UNROLLED unsigned rough_fields(const rm_profile *w, const rm_packing *p, const rm_span *span, rm_lid cell, int num, int twos)
 {
-  const int64_t  num   = u->stride;
-  const rm_lid   cells = stencil->num_cells;
-  const double  *slope = g->own + cell * g->stride, *c = mesh->cell_centroid[cell];
-  const rm_lanes scale = rm_lanes_of(RM_VALUE_SCALE);
-  rm_lanes       value[TWOS], most[TWOS], widest[TWOS], own[3][TWOS];
+  const rm_stencil *stencil = w->ground.stencil;
+  const rm_mesh    *mesh    = w->ground.mesh;
+  const rm_lid      cells   = stencil->num_cells;
+  const int64_t     stride  = 4 * (int64_t)p->num_fields;
+  const uint32_t   *own     = w->shown + 4 * span->first;
+  const uint32_t   *halo    = (const uint32_t *)(const void *)w->slopes.received + 4 * span->first;
+  const rm_around   u       = rm_around_span(w, p, span);
+  const double     *c       = mesh->cell_centroid[cell];
+  const rm_lanes    scale   = rm_lanes_of(RM_VALUE_SCALE);
+  rm_lanes          value[TWOS], most[TWOS], widest[TWOS], slope[3][TWOS];
+  unsigned          rough = 0;
 
   for (int t = 0; t < twos; t++) {
     most[t] = widest[t] = rm_lanes_of(0.0);
-    value[t]            = scale * rm_lanes_at(u->own + cell * num + 2 * t);
-    for (int d = 0; d < 3; d++) own[d][t] = rm_lanes_at(slope + d * num + 2 * t);
+    value[t]            = scale * rm_lanes_at(u.own + cell * u.stride + 2 * t);
+    for (int d = 0; d < 3; d++) slope[d][t] = rm_lanes_from_halves(own + cell * stride + d * num + 2 * t);
   }
   for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
-    const rm_lid   n       = stencil->neighbour[k];
-    const bool     is_own  = n < cells;
-    const double  *x       = is_own ? mesh->cell_centroid[n] : stencil->halo_centroid[n - cells];
-    const double  *there   = is_own ? u->own + n * num : u->halo + (n - cells) * num;
-    const double  *other   = is_own ? g->own + n * g->stride : g->halo + (n - cells) * g->stride;
-    const rm_lanes half[3] = {rm_lanes_of(0.5 * (x[0] - c[0])), rm_lanes_of(0.5 * (x[1] - c[1])),
-                              rm_lanes_of(0.5 * (x[2] - c[2]))};
+    const rm_lid    n       = stencil->neighbour[k];
+    const bool      is_own  = n < cells;
+    const double   *x       = is_own ? mesh->cell_centroid[n] : stencil->halo_centroid[n - cells];
+    const double   *there   = is_own ? u.own + n * u.stride : u.halo + (n - cells) * u.stride;
+    const uint32_t *other   = is_own ? own + n * stride : halo + (n - cells) * stride;
+    const rm_lanes  half[3] = {rm_lanes_of(0.5 * (x[0] - c[0])), rm_lanes_of(0.5 * (x[1] - c[1])),
+                               rm_lanes_of(0.5 * (x[2] - c[2]))};
 
     for (int t = 0; t < twos; t++) {
-      rm_lanes wrong = scale * rm_lanes_at(there + 2 * t) - value[t], told = (own[0][t] + rm_lanes_at(other + 2 * t)) * half[0];
+      rm_lanes wrong = scale * rm_lanes_at(there + 2 * t) - value[t];
+      rm_lanes told  = (slope[0][t] + rm_lanes_from_halves(other + 2 * t)) * half[0];
 
-      for (int d = 1; d < 3; d++) told += (own[d][t] + rm_lanes_at(other + d * num + 2 * t)) * half[d];
+      for (int d = 1; d < 3; d++) told += (slope[d][t] + rm_lanes_from_halves(other + d * num + 2 * t)) * half[d];
       wrong     = rm_lanes_magnitude(wrong - told);
       most[t]   = rm_lanes_greatest(wrong, most[t]);
-      widest[t] = rm_lanes_greatest(rm_lanes_at(other + 3 * num + 2 * t), widest[t]);
+      widest[t] = rm_lanes_greatest(rm_lanes_from_halves(other + 3 * num + 2 * t), widest[t]);
     }
   }
-  for (int t = 0; t < twos; t++) {
-    error[t] = most[t];
-    range[t] = widest[t];
-  }
+  for (int f = 0; f < num; f++) rough |= most[f / 2][f % 2] > ROUGH * widest[f / 2][f % 2] ? 1u << f : 0u;
+  return rough;
 }
 
-void rm_smooth_roughness(const rm_stencil *stencil, const rm_mesh *mesh, const rm_packing *packing, rm_numbers given,
-                         rm_numbers slope, double *rough)
+/* Set bits first to first + num - 1. */
+static void set_bits(uint64_t *words, int first, int num, unsigned bits)
 {
-  const int num = packing->num_fields;
+  for (int f = 0; f < num; f++) words[(first + f) / 64] |= (uint64_t)(bits >> f & 1) << (first + f) % 64;
+}
 
-  for (rm_lid c = 0; c < stencil->num_cells; c++) {
-    for (int f = 0; f < num && packing->num_flags > 0; f++) rough[(int64_t)c * num + f] = 0.0;
-    for (int i = 0; i < packing->num_spans; i++) {
-      const int       first = packing->span[i].first;
-      const rm_around u = rm_around_of(given, first, num), g = {slope.own + first, slope.halo + first, 4 * (int64_t)num};
-      double         *at = rough + (int64_t)c * num + first;
-      rm_lanes        error[TWOS], range[TWOS];
+void rm_smooth_roughness(const rm_profile *w, const rm_packing *p, uint64_t *rough)
+{
+  const int    words = rm_rough_words(p->num_fields);
+  const rm_lid cells = w->ground.mesh->num_cells;
 
-      if (packing->span[i].num > 2)
-        errors_of_twos(stencil, mesh, c, TWOS, &u, &g, error, range);
-      else
-        errors_of_twos(stencil, mesh, c, 1, &u, &g, error, range);
-      for (int f = 0; f < packing->span[i].num; f++) at[f] = error[f / 2][f % 2] > ROUGH * range[f / 2][f % 2] ? 1.0 : 0.0;
+  memset(rough, 0, (size_t)cells * (size_t)words * sizeof *rough);
+  for (rm_lid c = 0; c < cells; c++)
+    for (int i = 0; i < p->num_spans; i++) {
+      const rm_span *span = &p->span[i];
+
+      if (p->order[span->first] < 2) continue;
+      const unsigned bits =
+          span->num > 2 ? rough_fields(w, p, span, c, span->num, TWOS) : rough_fields(w, p, span, c, span->num, 1);
+
+      if (bits) set_bits(rough + (int64_t)c * words, span->first, span->num, bits);
     }
-  }
 }
 
-void rm_smooth_spread(const rm_ground *ground, const uint8_t *needs_halo, const rm_packing *packing, rm_numbers rough,
-                      double *spread)
+static bool is_any(const uint64_t *words, int num)
 {
-  const rm_stencil *stencil = ground->stencil;
-  const int         num     = packing->num_fields;
+  uint64_t all = 0;
 
-  memcpy(spread, rough.own, (size_t)stencil->num_cells * (size_t)num * sizeof *spread);
-  for (rm_lid c = 0; c < stencil->num_cells;
-       c++) { /* from the rough cells, which are few, but for those that are nobody's neighbour */
-    const int64_t first = stencil->offset[c], end = stencil->offset[c + 1];
+  for (int k = 0; k < num; k++) all |= words[k];
+  return all != 0;
+}
 
-    for (int f = 0; f < num && ground->rows->cover[c] != REMAP_UNWANTED; f++) {
-      if (!(rough.own[(int64_t)c * num + f] > 0.0)) continue;
+void rm_smooth_spread(const rm_profile *w, int num_words, const uint64_t *rough, const uint64_t *halo, uint64_t *spread)
+{
+  const rm_stencil *stencil = w->ground.stencil;
+  const rm_lid      cells   = stencil->num_cells;
+
+  memcpy(spread, rough, (size_t)cells * (size_t)num_words * sizeof *spread);
+  for (rm_lid c = 0; c < cells; c++) { /* from the rough cells, which are few, but for those that are nobody's neighbour */
+    const int64_t   first = stencil->offset[c], end = stencil->offset[c + 1];
+    const uint64_t *own = rough + (int64_t)c * num_words;
+
+    if (w->ground.rows->cover[c] != REMAP_UNWANTED && is_any(own, num_words))
       for (int64_t k = first; k < end; k++)
-        if (stencil->neighbour[k] < stencil->num_cells) spread[(int64_t)stencil->neighbour[k] * num + f] = 1.0;
-    }
-    for (int64_t k = first; k < end && needs_halo[c]; k++)
-      for (int f = 0; f < num && stencil->neighbour[k] >= stencil->num_cells; f++)
-        if (rough.halo[(int64_t)(stencil->neighbour[k] - stencil->num_cells) * num + f] > 0.0)
-          spread[(int64_t)c * num + f] = 1.0;
+        for (int i = 0; i < num_words && stencil->neighbour[k] < cells; i++)
+          spread[(int64_t)stencil->neighbour[k] * num_words + i] |= own[i];
+    for (int64_t k = first; k < end && w->needs_halo[c]; k++)
+      for (int i = 0; i < num_words && stencil->neighbour[k] >= cells; i++)
+        spread[(int64_t)c * num_words + i] |= halo[(int64_t)(stencil->neighbour[k] - cells) * num_words + i];
   }
 }

@@ -3,7 +3,7 @@
  * Cells of one rank meet at nodes. Cells of other ranks are found in three exchanges: a node that lies in a crowd of another
  * rank's cells is announced to the rank its coordinates hash to; that rank tells all who announced the same point of each
  * other; those send each other the cells around it. Nodes are told apart by coordinates alone, so what is found does not
- * depend on the partition. O(n) time and, for hexahedra, about 900 bytes per cell.
+ * depend on the partition. O(n) time; for hexahedra, about 150 bytes per cell and 620 more with weights.
  *
  * Around the axis of a mesh of revolution, and wherever else very many cells meet at one node, all with all would be n^2. Of
  * the cells at such a node, in canonical order, each has as neighbours those next to it, which are mostly near it in space, and
@@ -117,26 +117,22 @@ static remap_status pack_announcements(draft *d, const rm_crowds *crowds, int64_
   const rm_mesh *mesh = d->mesh;
   const double(*box)[6] = crowds->box + crowds->num_own; /* of other ranks */
   const rm_boxtree *tree;
-  int              *to; /* [num_nodes] where a node is announced, -1: nowhere */
-  int64_t          *next;
+  rm_lid           *to, *node; /* [num_nodes] where a node is announced, -1: nowhere; the nodes by that */
 
   RM_TRY(rm_boxtree_build(d->scratch, crowds->num - crowds->num_own, box, &tree));
   RM_NEW(to, d->scratch, mesh->num_nodes);
-  RM_NEW(next, d->scratch, comm->size);
-  for (int r = 0; r <= comm->size; r++) offset[r] = 0;
+  RM_NEW(node, d->scratch, mesh->num_nodes);
   for (rm_lid k = 0; k < mesh->num_nodes; k++) {
     const double *x = mesh->node_xyz[k], point[6] = {x[0], x[1], x[2], x[0], x[1], x[2]};
 
-    to[k] = rm_boxtree_meets(tree, box, point) ? (int)(rm_hash_point(x) % (uint64_t)comm->size) : -1;
-    if (to[k] >= 0) offset[to[k]]++;
+    to[k] = rm_boxtree_meets(tree, box, point) ? (rm_lid)(rm_hash_point(x) % (uint64_t)comm->size) : -1;
   }
-  rm_offsets(offset, comm->size);
-  RM_NEW(*out, d->scratch, offset[comm->size]);
-  for (int r = 0; r < comm->size; r++) next[r] = offset[r];
-  for (rm_lid k = 0; k < mesh->num_nodes; k++) {
-    const double *x = mesh->node_xyz[k];
+  const int64_t num = rm_group(mesh->num_nodes, to, comm->size, offset, node);
+  RM_NEW(*out, d->scratch, num);
+  for (int64_t k = 0; k < num; k++) {
+    const double *x = mesh->node_xyz[node[k]];
 
-    if (to[k] >= 0) (*out)[next[to[k]]++] = (announcement){{x[0], x[1], x[2]}, k};
+    (*out)[k] = (announcement){{x[0], x[1], x[2]}, node[k]};
   }
   return REMAP_OK;
 }
@@ -224,13 +220,15 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
   const rm_mesh *mesh = d->mesh;
   const int64_t  n    = offset[d->comm->size];
   rm_keyed      *keyed, *spare;
-  rm_lid        *halo_of; /* [n] */
-  int64_t        num = 0, *next;
+  rm_lid        *halo_of, *node, *order; /* [n] */
+  int64_t        num = 0;
 
+  if (n > INT32_MAX) return REMAP_TOO_LARGE;
   RM_NEW(keyed, d->scratch, n);
   RM_NEW(spare, d->scratch, n);
   RM_NEW(halo_of, d->scratch, n);
-  RM_NEW(next, d->scratch, mesh->num_nodes);
+  RM_NEW(node, d->scratch, n);
+  RM_NEW(order, d->scratch, n);
   for (int r = 0; r < d->comm->size; r++)
     for (int64_t k = offset[r]; k < offset[r + 1]; k++) keyed[k] = (rm_keyed){(uint64_t)r << 32 | (uint64_t)came[k].cell, k};
   rm_sort_keyed(keyed, spare, n);
@@ -261,12 +259,11 @@ static remap_status list_halo(draft *d, const int64_t *offset, const visitor *ca
     d->volume[all] = v->volume;
     d->global[all] = v->global;
   }
-  RM_NEW0(d->node_halo_offset, d->scratch, (int64_t)mesh->num_nodes + 1);
+  RM_NEW(d->node_halo_offset, d->scratch, (int64_t)mesh->num_nodes + 1);
   RM_NEW(d->node_halo, d->scratch, n);
-  for (int64_t k = 0; k < n; k++) d->node_halo_offset[came[k].node]++;
-  rm_offsets(d->node_halo_offset, mesh->num_nodes);
-  for (rm_lid k = 0; k < mesh->num_nodes; k++) next[k] = d->node_halo_offset[k];
-  for (int64_t k = 0; k < n; k++) d->node_halo[next[came[k].node]++] = halo_of[k];
+  for (int64_t k = 0; k < n; k++) node[k] = came[k].node;
+  rm_group(n, node, mesh->num_nodes, d->node_halo_offset, order);
+  for (int64_t k = 0; k < n; k++) d->node_halo[k] = halo_of[order[k]];
   return REMAP_OK;
 }
 

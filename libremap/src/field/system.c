@@ -254,14 +254,11 @@ static void multiply(const double g[3], const double G[3], double scale, double 
 }
 
 /* The polynomial of a field as reconstructed, with a mean of its own. */
-static polynomial polynomial_of(const rm_packing *p, int f, double mean, const double *place)
+static void read_polynomial(const rm_packing *p, int f, double mean, const double *place, polynomial *out)
 {
-  const double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
-  polynomial    q = {.value = mean};
-
-  for (int d = 0; d < 3; d++) q.slope[d] = at[RM_PACK_SLOPE + d];
-  for (int k = 0; k < 6; k++) q.curvature[k] = h[k];
-  return q;
+  out->value = mean;
+  rm_pack_read(p, f, place, RM_PACK_SLOPE, 3, out->slope);
+  rm_pack_read(p, f, place, rm_pack_curvature(p->has_bounds), 6, out->curvature);
 }
 
 /* Density times q, of which the mass-weighted mean is q->value: coefficients of amounts per volume. spread is the cell's mean
@@ -306,22 +303,24 @@ static bool is_finite_polynomial(const polynomial *q)
  * moments. */
 static void put(const rm_packing *p, int f, const polynomial *q, const double spread[6], const double error[3], double *place)
 {
-  double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
+  const int    at       = rm_pack_curvature(p->has_bounds);
+  const double constant = -(rm_dot6(q->curvature, spread) +
+                            (q->slope[0] * error[0] + q->slope[1] * error[1] + q->slope[2] * error[2]));
 
-  for (int d = 0; d < 3; d++) at[RM_PACK_SLOPE + d] = q->slope[d];
-  for (int k = 0; k < 6; k++) h[k] = q->curvature[k];
-  h[6] = -(rm_dot6(q->curvature, spread) + (q->slope[0] * error[0] + q->slope[1] * error[1] + q->slope[2] * error[2]));
+  rm_pack_write(p, f, q->slope, RM_PACK_SLOPE, 3, place);
+  rm_pack_write(p, f, q->curvature, at, 6, place);
+  rm_pack_write(p, f, &constant, at + 6, 1, place);
 }
 
 /* No slopes: the amounts alone. */
 static void flatten(const rm_packing *p, int s, double *place)
 {
   for (int f = 0; f < p->num_fields; f++) {
-    double *at = place + p->at[f], *h = at + rm_pack_curvature(p->has_bounds);
+    static const double none[7] = {0.0};
 
     if (p->system_of[f] != s) continue;
-    for (int d = 0; d < 3; d++) at[RM_PACK_SLOPE + d] = 0.0;
-    for (int k = 0; k < 7; k++) h[k] = 0.0;
+    rm_pack_write(p, f, none, RM_PACK_SLOPE, 3, place);
+    rm_pack_write(p, f, none, rm_pack_curvature(p->has_bounds), 7, place);
   }
 }
 
@@ -338,7 +337,7 @@ static factors factors_of(const rm_packing *p, const rm_system *s, const double 
 {
   factors w = {.mean = number[s->density], .is_body = fabs(volume) > 0.0};
 
-  w.density = polynomial_of(p, s->density, w.mean, place);
+  read_polynomial(p, s->density, w.mean, place, &w.density);
   for (int k = 0; k < 6; k++) {
     w.spread[k] = w.is_body ? second[k] / volume : 0.0;
     w.is_body   = w.is_body && (k > 2 || w.spread[k] >= 0.0);
@@ -346,7 +345,7 @@ static factors factors_of(const rm_packing *p, const rm_system *s, const double 
   w.density.value -= rm_dot6(w.density.curvature, w.spread) / RM_VALUE_SCALE;
   for (int d = 0; d < 3; d++) {
     w.moves[d] = s->motion[d] >= 0;
-    if (w.moves[d]) w.velocity[d] = polynomial_of(p, s->motion[d], number[s->motion[d]], place);
+    if (w.moves[d]) read_polynomial(p, s->motion[d], number[s->motion[d]], place, &w.velocity[d]);
   }
   return w;
 }
@@ -357,10 +356,10 @@ static polynomial total_energy(const rm_packing *p, int system, const factors *w
 {
   const rm_system *s        = &p->system[system];
   const double     total    = rm_system_amount(p, s->energy, given, number);
-  const polynomial internal = polynomial_of(p, s->energy, number[s->energy], place);
   const bool       per_mass = rm_system_is_energy_per_mass(p, system);
-  polynomial       q        = {.value = (per_mass ? total : total - number[s->energy]) / w->mean}, energy;
+  polynomial       q        = {.value = (per_mass ? total : total - number[s->energy]) / w->mean}, energy, internal;
 
+  read_polynomial(p, s->energy, number[s->energy], place, &internal);
   for (int d = 0; d < 3 && per_mass; d++) q.slope[d] = internal.slope[d];
   for (int k = 0; k < 6 && per_mass; k++) q.curvature[k] = internal.curvature[k];
   add_kinetic(&q, w->velocity, w->moves);
@@ -386,8 +385,9 @@ void rm_system_combine(const rm_packing *p, int system, const double *given, con
     } else if (f == s->energy) {
       amount = total_energy(p, system, &w, given, number, place);
     } else {
-      const polynomial q = polynomial_of(p, f, number[f], place);
+      polynomial q;
 
+      read_polynomial(p, f, number[f], place, &q);
       amount = times_density(&w.density, w.mean, &q, w.spread);
     }
     is_good = is_finite_polynomial(&amount);

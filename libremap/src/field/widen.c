@@ -203,8 +203,10 @@ static remap_status list_all(draft *d, int64_t num_answers, const answer *came, 
   rm_keyed         *keyed, *spare;
   known            *all;
   rm_lid           *new_of; /* [n] near halo, then answers */
-  int64_t           num = 0, num_own = 0, *next;
+  rm_lid           *about, *order; /* [num_answers] */
+  int64_t           num = 0, num_own = 0;
 
+  if (n > INT32_MAX) return REMAP_TOO_LARGE;
   RM_NEW(keyed, d->scratch, n);
   RM_NEW(spare, d->scratch, n);
   RM_NEW(new_of, d->scratch, n);
@@ -241,13 +243,13 @@ static remap_status list_all(draft *d, int64_t num_answers, const answer *came, 
   d->new_of_halo    = new_of;
   d->wide->num_halo = (rm_lid)num;
 
-  RM_NEW0(d->answer_offset, d->scratch, (int64_t)near->num_halo + 1);
+  RM_NEW(d->answer_offset, d->scratch, (int64_t)near->num_halo + 1);
   RM_NEW(d->answer, d->scratch, num_answers);
-  RM_NEW(next, d->scratch, near->num_halo);
-  for (int64_t k = 0; k < num_answers; k++) d->answer_offset[came[k].halo]++;
-  rm_offsets(d->answer_offset, near->num_halo);
-  for (rm_lid h = 0; h < near->num_halo; h++) next[h] = d->answer_offset[h];
-  for (int64_t k = 0; k < num_answers; k++) d->answer[next[came[k].halo]++] = new_of[near->num_halo + k];
+  RM_NEW(about, d->scratch, num_answers);
+  RM_NEW(order, d->scratch, num_answers);
+  for (int64_t k = 0; k < num_answers; k++) about[k] = came[k].halo;
+  rm_group(num_answers, about, near->num_halo, d->answer_offset, order);
+  for (int64_t k = 0; k < num_answers; k++) d->answer[k] = new_of[near->num_halo + order[k]];
   return REMAP_OK;
 }
 

@@ -97,25 +97,23 @@ static remap_status order_pairs(rm_arena *scratch, const job *j, const rm_arriva
                                 const double *volume, rm_lid *place)
 {
   const rm_lid num = rows->num_givers;
-  int64_t     *next, longest = 0;
+  int64_t      longest = 0;
   uint64_t    *word;
   rm_lid      *order, *rank_of_giver;
 
   RM_NEW(order, scratch, num);
   RM_NEW(rank_of_giver, scratch, num);
-  RM_NEW(next, scratch, rows->num_cells);
   RM_TRY(rm_canonical_order(scratch, j->frame, num, (const double(*)[3])draft->giver_centroid, volume, draft->giver_global,
                             order));
   for (rm_lid k = 0; k < num; k++) rank_of_giver[order[k]] = k;
-  for (int64_t k = 0; k < a->num; k++) {
-    RM_ASSERT(a->receiver[k] >= 0 && a->receiver[k] < rows->num_cells);
-    draft->offset[a->receiver[k]]++;
+  for (int64_t k = 0; k < a->num; k++) RM_ASSERT(a->receiver[k] >= 0 && a->receiver[k] < rows->num_cells);
+  rm_group(a->num, a->receiver, rows->num_cells, draft->offset, place);
+  for (rm_lid c = 0; c < rows->num_cells; c++) {
+    const int64_t length = draft->offset[c + 1] - draft->offset[c];
+
+    longest = length > longest ? length : longest;
   }
-  for (rm_lid c = 0; c < rows->num_cells; c++) longest = draft->offset[c] > longest ? draft->offset[c] : longest;
-  rm_offsets(draft->offset, rows->num_cells);
   RM_NEW(word, scratch, longest);
-  for (rm_lid c = 0; c < rows->num_cells; c++) next[c] = draft->offset[c];
-  for (int64_t k = 0; k < a->num; k++) place[next[a->receiver[k]]++] = (rm_lid)k;
   for (rm_lid c = 0; c < rows->num_cells; c++)
     sort_row(a->giver, rank_of_giver, word, place + draft->offset[c], draft->offset[c + 1] - draft->offset[c]);
   return REMAP_OK;

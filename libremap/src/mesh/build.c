@@ -36,21 +36,20 @@ static remap_status fill_ids(const rm_mesh_job *job, rm_arena *arena, rm_gid **o
   return REMAP_OK;
 }
 
-static int home_of(rm_gid id, int num_ranks) { return (int)((rm_hash_word((uint64_t)id) >> 32) * (uint64_t)num_ranks >> 32); }
-
 /* Ids by the rank that looks after them. */
 static remap_status sort_ids(const rm_mesh_job *job, const rm_gid *id, int64_t **offset, rm_gid **sorted)
 {
   const int64_t num  = job->given->num_cells;
   const int     size = job->comm->size;
-  int64_t      *next;
+  rm_lid       *home, *order;
 
-  RM_NEW0(next, job->scratch, (int64_t)size + 2);
+  RM_NEW(home, job->scratch, num);
+  RM_NEW(order, job->scratch, num);
+  RM_NEW(*offset, job->scratch, (int64_t)size + 1);
   RM_NEW(*sorted, job->scratch, num);
-  for (int64_t c = 0; c < num; c++) next[home_of(id[c], size) + 1]++;
-  rm_offsets(next + 1, size);
-  for (int64_t c = 0; c < num; c++) (*sorted)[next[home_of(id[c], size) + 1]++] = id[c];
-  *offset = next; /* each rank's end is the next one's begin */
+  for (int64_t c = 0; c < num; c++) home[c] = rm_mesh_home_of(rm_hash_word((uint64_t)id[c]), size);
+  rm_group(num, home, size, *offset, order);
+  for (int64_t c = 0; c < num; c++) (*sorted)[c] = id[order[c]];
   return REMAP_OK;
 }
 

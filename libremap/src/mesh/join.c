@@ -19,19 +19,16 @@ typedef struct route {
   rm_lid  *loop;   /* [num loops] */
 } route;
 
-static int home_of(uint64_t hash, int num_ranks) { return (int)((hash >> 32) * (uint64_t)num_ranks >> 32); }
-
 static remap_status make_route(const rm_mesh_job *job, rm_lid num, const uint64_t *hash, route *out)
 {
   const int size = job->comm->size;
-  int64_t  *next;
+  rm_lid   *home;
 
-  RM_NEW0(next, job->scratch, (int64_t)size + 2);
+  RM_NEW(home, job->scratch, num);
+  RM_NEW(out->offset, job->scratch, (int64_t)size + 1);
   RM_NEW(out->loop, job->scratch, num);
-  for (rm_lid i = 0; i < num; i++) next[home_of(hash[i], size) + 1]++;
-  rm_offsets(next + 1, size);
-  for (rm_lid i = 0; i < num; i++) out->loop[next[home_of(hash[i], size) + 1]++] = i;
-  out->offset = next; /* each rank's end is the next one's begin */
+  for (rm_lid i = 0; i < num; i++) home[i] = rm_mesh_home_of(hash[i], size);
+  rm_group(num, home, size, out->offset, out->loop);
   return REMAP_OK;
 }
 

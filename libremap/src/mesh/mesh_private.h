@@ -39,6 +39,12 @@ typedef struct rm_loops {
 /* Global id of a cell given on this rank, -1 if there is no such cell. */
 rm_gid rm_mesh_global_of(const remap_mesh *given, rm_gid first_global, int64_t cell);
 
+/* The rank that looks after a hash. */
+static inline rm_lid rm_mesh_home_of(uint64_t hash, int num_ranks)
+{
+  return (rm_lid)((hash >> 32) * (uint64_t)num_ranks >> 32);
+}
+
 /* Number of cells of all lower ranks, over counts that may be nonsense. Collective. */
 remap_status rm_mesh_first_global(const rm_comm *comm, const remap_mesh *given, rm_gid *out);
 

@@ -78,20 +78,14 @@ remap_status rm_part_route_to_seats(rm_arena *arena, const rm_comm *comm, const 
 {
   const rm_lid  num  = zone->num_cells[mesh->side];
   const rm_lid *cell = zone->cell[mesh->side];
-  int64_t      *next;
-  int          *seat;
+  rm_lid       *seat;
 
   RM_NEW(seat, arena, num);
-  RM_NEW(next, arena, comm->size);
   RM_NEW(out->cell, arena, num);
-  RM_NEW0(out->offset, arena, (int64_t)comm->size + 1);
-  for (rm_lid k = 0; k < num; k++) {
-    seat[k] = rm_part_seat(cuts, rm_part_key(zone_frame, mesh->cell_box[cell[k]]));
-    out->offset[seat[k]]++;
-  }
-  rm_offsets(out->offset, comm->size);
-  for (int r = 0; r < comm->size; r++) next[r] = out->offset[r];
-  for (rm_lid k = 0; k < num; k++) out->cell[next[seat[k]]++] = cell[k];
+  RM_NEW(out->offset, arena, (int64_t)comm->size + 1);
+  for (rm_lid k = 0; k < num; k++) seat[k] = rm_part_seat(cuts, rm_part_key(zone_frame, mesh->cell_box[cell[k]]));
+  rm_group(num, seat, comm->size, out->offset, out->cell);
+  for (rm_lid k = 0; k < num; k++) out->cell[k] = cell[out->cell[k]];
   return REMAP_OK;
 }
 
