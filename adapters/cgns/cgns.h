@@ -192,8 +192,9 @@ typedef struct rcgns_boundaries {
 } rcgns_boundaries;
 
 /** Which faces of this rank's mesh are on which BC_t: by ranges and lists of faces, elements or vertices; a face is on one of
- *  vertices if all of its own are listed. Where two name one face, the first has it. A condition that is given in another way
- *  (a list of a block at FaceCenter, which does not say across which axis) is left out and noted. Collective.
+ *  vertices if all of its own are listed. Where two name one face, the first has it. A list of a block at FaceCenter
+ *  does not say across which axis: InwardNormalIndex does, or that there is one side of the block only where all of it may be.
+ *  A condition that is given in another way is left out and noted. Collective.
  *  Errors: IO (a list cannot be read), MEMORY. */
 rcgns_status rcgns_read_boundaries(rcgns_file *file, rcgns_boundaries *out, rcgns_message *message);
 

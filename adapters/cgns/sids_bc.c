@@ -301,8 +301,9 @@ static int64_t number_points(const bc_zone *z, bc_where where, int64_t *number, 
   return n / 3;
 }
 
-/* A list of numbers, in pieces. Collective. */
-static rcgns_status give_list(bc_zone *z, int64_t node, bc_where where, int32_t boundary, rcgns_message *message)
+/* Read a list in pieces, whole triples of indices in a block, for visit. Collective. */
+static rcgns_status read_list(bc_zone *z, int64_t node, void (*visit)(bc_zone *z, int64_t *number, int64_t n, void *user),
+                              void *user, rcgns_message *message)
 {
   enum { PIECE = BLOCK / 3 * 3 };
   const rc_node *n      = rc_node_at(&z->file->tree, node);
@@ -314,12 +315,31 @@ static rcgns_status give_list(bc_zone *z, int64_t node, bc_where where, int32_t 
     const int64_t hi = lo + PIECE < rc_count(n) ? lo + PIECE : rc_count(n);
 
     status = rc_read(z->file, RCGNS_OK, node, &box, lo, hi, 'I', block, message);
-    if (status != RCGNS_OK) break;
-    const int64_t num = z->zone->is_structured ? number_points(z, where, block, hi - lo) : hi - lo;
-    give_numbers(z, block, num, where == OF_VERTICES, boundary);
+    if (status == RCGNS_OK) visit(z, block, hi - lo, user);
   }
   free(block);
   return status;
+}
+
+typedef struct giving {
+  bc_where where;
+  int32_t  boundary;
+} giving;
+
+static void give_piece(bc_zone *z, int64_t *number, int64_t n, void *user)
+{
+  const giving *g = user;
+
+  give_numbers(z, number, z->zone->is_structured ? number_points(z, g->where, number, n) : n, g->where == OF_VERTICES,
+               g->boundary);
+}
+
+/* A list of numbers. Collective. */
+static rcgns_status give_list(bc_zone *z, int64_t node, bc_where where, int32_t boundary, rcgns_message *message)
+{
+  giving g = {where, boundary};
+
+  return read_list(z, node, give_piece, &g, message);
 }
 
 /* A list, or numbers of an unstructured zone as a range. Collective. */
@@ -506,6 +526,61 @@ static bc_where where_of(const rc_tree *tree, int64_t bc, bool is_structured, bo
                                             : OF_FACES;
 }
 
+/* ---- faces of a block whose axis is not told ------------------------------------------------------------------------- */
+
+typedef struct extent {
+  int64_t low[3], high[3]; /* of the triples of a list */
+} extent;
+
+static void widen(bc_zone *z, int64_t *number, int64_t n, void *user)
+{
+  extent *e = user;
+
+  (void)z;
+  for (int64_t i = 0; i < n; i++) {
+    const int64_t d = i % 3;
+
+    if (number[i] < e->low[d]) e->low[d] = number[i];
+    if (number[i] > e->high[d]) e->high[d] = number[i];
+  }
+}
+
+/* Do triples of that extent name faces of the block's side across an axis? */
+static bool is_side(const rc_zone *zone, const extent *e, int axis)
+{
+  bool is = e->low[axis] == e->high[axis] && (e->low[axis] == 1 || e->low[axis] == zone->vertices[axis]);
+
+  for (int d = 0; d < 3; d++) is = is && e->low[d] >= 1 && (d == axis || e->high[d] <= zone->cells[d]);
+  return is;
+}
+
+/* The axis that a condition's normal tells, -1: none. */
+static int axis_of_normal(const rc_tree *tree, int64_t bc)
+{
+  const int64_t  at     = rc_tree_find(tree, bc, -1, NULL, "InwardNormalIndex");
+  const int64_t *normal = at < 0 || rc_count(rc_node_at(tree, at)) != 3 ? NULL : rc_small_ints(tree, rc_node_at(tree, at));
+
+  for (int d = 0; normal && d < 3; d++)
+    if (normal[d] && !normal[(d + 1) % 3] && !normal[(d + 2) % 3]) return d;
+  return -1;
+}
+
+/* Across which axis the faces of a list at FaceCenter are: by the condition's normal, else where only one side of the block can
+ * be meant; OF_FACES: it is not told. Collective. */
+static rcgns_status find_axis(bc_zone *z, int64_t bc, int64_t place, bc_where *where, rcgns_message *message)
+{
+  const int normal = axis_of_normal(&z->file->tree, bc);
+  extent    e      = {{INT64_MAX, INT64_MAX, INT64_MAX}, {INT64_MIN, INT64_MIN, INT64_MIN}};
+  int       num    = 0;
+
+  if (normal >= 0) *where = (bc_where)(OF_I_FACES + normal);
+  if (normal >= 0) return RCGNS_OK;
+  RC_TRY(read_list(z, place, widen, &e, message));
+  for (int d = 0; d < 3; d++)
+    if (is_side(z->zone, &e, d)) *where = num++ ? OF_FACES : (bc_where)(OF_I_FACES + d);
+  return RCGNS_OK;
+}
+
 /* One condition of a zone. Collective. */
 static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
 {
@@ -513,7 +588,7 @@ static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
   bool           is_range = false, is_elements = false;
   const int64_t  place = place_of(tree, bc, &is_range, &is_elements);
   const bool     is_block = z->zone->is_structured;
-  const bc_where where    = where_of(tree, bc, is_block, is_elements);
+  bc_where       where    = where_of(tree, bc, is_block, is_elements);
   char           type[RC_NAME], text[240];
   int32_t        boundary;
 
@@ -524,6 +599,8 @@ static rcgns_status read_bc(bc_zone *z, int64_t bc, rcgns_message *message)
     give_range(z, rc_small_ints(tree, rc_node_at(tree, place)), where == OF_VERTICES, boundary);
     return RCGNS_OK;
   }
+  if (place >= 0 && !is_range && where == OF_FACES && rc_count(rc_node_at(tree, place)) % 3 == 0)
+    RC_TRY(find_axis(z, bc, place, &where, message));
   if (place >= 0 && (!is_block || (!is_range && where != OF_ELEMENTS && where != OF_FACES &&
                                    rc_count(rc_node_at(tree, place)) % 3 == 0)))
     return give_place(z, place, is_range, where, boundary, message);

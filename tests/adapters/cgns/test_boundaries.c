@@ -94,6 +94,7 @@ static void blocks_name_faces_by_ranges(void)
 static void blocks_name_faces_by_lists(void)
 {
   const int64_t square[18] = {1, 2, 1, 1, 1, 1, 2, 2, 2, 1, 1, 2, 1, 2, 2, 3, 4, 5}, below[6] = {1, 1, 1, 2, 3, 1};
+  const int64_t front[9] = {1, 1, 2, 2, 1, 2, 1, 1, 3}, far[3] = {1, 2, 5}, strip[6] = {1, 1, 1, 1, 2, 1};
   const int64_t edge[12] = {3, 4, 5, 3, 3, 5, 3, 4, 4, 2, 3, 4}, wild[12] = {0, 1, 1, 4, 1, 1, 1, 1, -3, 1, INT32_MAX, 1};
   cf_file      *f     = cf_new(3.4);
   const int64_t block = cf_zone(f, cf_base(f), "Block", 3, (int64_t[]){3, 4, 5, 2, 3, 4, 0, 0, 0});
@@ -108,6 +109,12 @@ static void blocks_name_faces_by_lists(void)
   put_bc(f, list, "below", "BCWall", "PointList", 2, (int64_t[]){2, 3}, below, "KFaceCenter");
   put_bc(f, list, "inside", "BCWall", "PointList", 2, (int64_t[]){2, 3}, below, "JFaceCenter");
   put_bc(f, list, "edge", "BCWall", "PointList", 2, (int64_t[]){4, 3}, edge, "Vertex");
+  put_bc(f, list, "front", "BCInflow", "PointList", 2, (int64_t[]){3, 3}, front, "FaceCenter");
+  put_bc(f, list, "far", "BCInflow", "PointList", 2, (int64_t[]){1, 3}, far, "FaceCenter");
+  put_bc(f, list, "strip", "BCInflow", "PointList", 2, (int64_t[]){2, 3}, strip, "FaceCenter");
+  cf_ints(f, put_bc(f, list, "told", "BCInflow", "PointList", 2, (int64_t[]){2, 3}, strip, "FaceCenter"), "InwardNormalIndex",
+          "\"int[IndexDimension]\"", 3, (int64_t[]){0, 0, 1});
+  put_bc(f, list, "deep", "BCInflow", "PointList", 2, (int64_t[]){1, 3}, (int64_t[]){2, 2, 2}, "FaceCenter");
   put_bc(f, list, "wild", "BCWall", "PointList", 2, (int64_t[]){4, 3}, wild, "Vertex");
   put_bc(f, list, "wilder", "BCWall", "PointList", 2, (int64_t[]){4, 3}, wild, "IFaceCenter");
   cf_write(f, cf_path(path, "bc_points"));
@@ -119,8 +126,16 @@ static void blocks_name_faces_by_lists(void)
     RT_EQ(faces_of(file, &b, "square", "BCWall", &area), 1);
     RT_EQ(faces_of(file, &b, "below", "BCWall", &area), 2);
     RT_EQ(faces_of(file, &b, "inside", "BCWall", &area), 1);
-    for (int i = 3; i < 6; i++) RT_EQ(faces_of(file, &b, b.name[i], "BCWall", &area), 0);
-    RT_CHECK(!cf_has_note(file, "left out"));
+    RT_EQ(faces_of(file, &b, "edge", "BCWall", &area), 0);
+    RT_EQ(faces_of(file, &b, "wild", "BCWall", &area), 0);
+    RT_EQ(faces_of(file, &b, "wilder", "BCWall", &area), 0);
+    RT_EQ(faces_of(file, &b, "front", "BCInflow", &area), 3);
+    RT_EQ(faces_of(file, &b, "far", "BCInflow", &area), 1);
+    RT_EQ(faces_of(file, &b, "strip", "BCInflow", &area), 0); /* of the side across i or across k */
+    RT_EQ(faces_of(file, &b, "told", "BCInflow", &area), 1);  /* the first of them is "below" */
+    RT_EQ(faces_of(file, &b, "deep", "BCInflow", &area), 0);
+    for (int i = 0; i < b.num; i++)
+      RT_CHECK(cf_has_note(file, b.name[i]) == (!strcmp(b.name[i], "strip") || !strcmp(b.name[i], "deep")));
   }
   rcgns_close(&file);
   cf_remove(path);
