@@ -261,10 +261,9 @@ static void add_polygon_side(work *w, rm_lid j, double sign, const plane *pl, co
   g->first_side         = w->num_sides++;
 }
 
-void rm_moments_add_polygon(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
-                            const point *p, const point *q)
+void rm_moments_add_polygon(work *w, const rm_lid j[2], double sign, const plane *pl, const plane *other, const point *p,
+                            const point *q)
 {
-  (void)i, (void)kind;
   for (int h = 0; h < 2; h++) {
     if (j[h] < 0) continue;
     add_polygon_side(w, j[h], h ? -sign : sign, pl, p, q);

@@ -42,7 +42,6 @@ typedef struct slot {
 typedef struct point {
   const double *base;     /* the edge's first vertex, or the vertex  */
   double        delta[3]; /* from there; 0 for a vertex              */
-  double        at[3];    /* relative to the origin of cell i        */
   int           mesh;     /* of the edge                             */
   rm_lid        edge;     /* -1 for a vertex                         */
   rm_lid        triangle; /* of the other mesh, crossed by the edge  */
@@ -53,19 +52,48 @@ typedef struct point {
 typedef struct plane {
   int           mesh;
   rm_lid        triangle;
-  const double *n, *v;   /* normal, a vertex */
-  double        inverse; /* 1 / n.n, 0 for a triangle without area */
-  double        foot[3]; /* of the perpendicular from the origin of cell i, relative to it */
-  double        height;  /* foot = height n */
-  double        outward; /* 1, or -1 if n points into the cell whose facet it is */
+  const double *n, *v; /* normal, a vertex */
 } plane;
+
+/* A facet of cell i. */
+typedef struct own_facet {
+  plane  in;
+  double outward; /* 1, or -1 if n points into the cell                                             */
+  double height;  /* foot = height n                                                                */
+  double foot[3]; /* of the perpendicular from the origin of cell i on the plane, relative to it */
+  int    first_segment, last_segment; /* of those in it, in work.segment; past the end */
+} own_facet;
 
 /* An edge of a cell and two of its facets there: seen from outside, the boundary of the first runs along it, that of the
  * second against it. */
 typedef struct wedge {
   rm_lid edge;
-  int    plane[2]; /* in work.own_plane, -1 */
+  int    facet[2]; /* in work.own, -1 */
 } wedge;
+
+/* A segment in a facet of cell i. */
+typedef struct segment {
+  int cut, from, to; /* in work.cut, work.spot */
+} segment;
+
+/* What a facet of mesh 2 has in common with cell i: a polygon of the pairs on both sides of it. */
+typedef struct cut {
+  int32_t num_cones;
+  int     kinds;
+  int     slot[2];  /* of the pairs with the cells left and right of it, -1 */
+  int     plain[2]; /* those among them that are summed about the origin of cell i, -1 */
+  bool    any_plain, any_local;
+  double  n[3];
+  double  sum[10]; /* of its sides, see sums.c */
+} cut;
+
+/* Finds the items of one cell by their keys; its memory stays in the cache. */
+typedef struct table {
+  int32_t *item; /* [mask + 1] -1 */
+  int64_t  room;
+  uint32_t mask;
+  int      shift;
+} table;
 
 /* Where simulation of simplicity leaves a point: in a vertex of one of the meshes, where an edge of one crosses an edge of the
  * other, or where an edge crosses a facet. The edges are known once the locus is settled; a vertex may lie on more. */
@@ -132,12 +160,20 @@ typedef struct work {
   int               num_sums; /* 4 or 10 */
   int64_t          *piece_offset; /* [cells of mesh 1 + 1] pieces of edges of mesh 2 in them */
   rm_lid          (*piece)[2];    /* edge, number of the piece on it */
-  plane            *own_plane;    /* [num_planes] of the facets of cell i  */
+  own_facet        *own;          /* [num_own] facets of cell i */
   wedge            *wedge;        /* [num_wedges] at the edges of cell i   */
   int              *wedge_of;     /* [edges of mesh 1] -1 between cells    */
-  int64_t           own_plane_room, wedge_room;
-  int               num_planes, num_wedges;
-  rm_lid           *slot_of;      /* [cells of mesh 2] -1 */
+  int64_t           own_room, wedge_room;
+  int               num_own, num_wedges;
+  table             spots, cuts;  /* by spot_key and cut_key */
+  double          (*spot)[3];     /* [num_spots] crossings at cell i, relative to its origin */
+  uint32_t         *spot_key;     /* [num_spots] 2 * crossing + side */
+  cut              *cut;          /* [num_cuts] */
+  uint32_t         *cut_key;      /* [num_cuts] the facet */
+  segment          *segment;      /* [num_segments] */
+  int64_t           spot_room, spot_key_room, cut_room, cut_key_room, segment_room;
+  int               num_spots, num_cuts, num_segments;
+  int              *slot_of;      /* [cells of mesh 2] -1 */
   slot             *slots;
   int64_t           slots_room;
   int               num_slots;
@@ -169,20 +205,79 @@ typedef struct work {
   rm_lid           *source, *target;
   double           *volume, (*moment)[3], (*second)[6], (*second_back)[6];
   uint8_t          *flags;
-  int64_t           num_pairs, room[7];
+  int64_t           num_pairs, room[7]; /* rooms are equal, as far as the arrays are there */
 } work;
 
 /* What is done with a side p -> q of a polygon in plane pl, within cell i and on the border of cells j[0] and j[1] of mesh 2
  * (or in one of them, the other being RM_OUTSIDE): its cone counts sign times for the first, -sign times for the second. If
  * `other` is not NULL the side is one of a polygon there as well, and that cone counts the other way. */
-typedef void sink(work *w, rm_lid i, const rm_lid j[2], int kind, double sign, const plane *pl, const plane *other,
-                  const point *p, const point *q);
+typedef void sink(work *w, const rm_lid j[2], double sign, const plane *pl, const plane *other, const point *p, const point *q);
 
 /* A point relative to an origin. */
 INLINE void relative(const point *p, const double o[3], double out[3])
 {
   for (int c = 0; c < 3; c++) out[c] = (p->base[c] - o[c]) + p->delta[c];
 }
+
+/* The foot of the perpendicular from o on the plane with normal n through v, relative to o; returns h with foot = h n, 0 for a
+ * triangle without area. */
+INLINE double rm_moments_foot(const double n[3], const double v[3], const double o[3], double foot[3])
+{
+  const double square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+  const double along  = n[0] * (v[0] - o[0]) + n[1] * (v[1] - o[1]) + n[2] * (v[2] - o[2]);
+  const double height = square > 0 ? along / square : 0;
+
+  for (int c = 0; c < 3; c++) foot[c] = n[c] * height;
+  return height;
+}
+
+INLINE rm_lid piece_state(const rm_trace *tr, rm_lid e, rm_lid k)
+{
+  return k == 0 ? tr->state[e] : tr->crossing[tr->first[e] + k - 1].state;
+}
+
+/* How often a cell winds about piece k of an edge. */
+INLINE int piece_number(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell)
+{
+  const rm_lid state = piece_state(tr, e, k);
+
+  if (state >= RM_OUTSIDE) return state == cell;
+  for (rm_lid z = tr->list_offset[-2 - state]; z < tr->list_offset[-1 - state]; z++)
+    if (tr->winding[z].cell == cell) return tr->winding[z].number;
+  return 0;
+}
+
+/* Pieces of an edge about which a cell winds equally often count as one: what cuts them are other cells that overlap this one,
+ * and another rank need not have those. The number of the first piece behind those that begin with piece k; k if they began
+ * before. */
+INLINE rm_lid run_end(const rm_trace *tr, rm_lid e, rm_lid k, rm_lid cell, int number)
+{
+  if (k > 0 && piece_number(tr, e, k - 1, cell) == number) return k;
+  do k++;
+  while (k <= tr->count[e] && piece_number(tr, e, k, cell) == number);
+  return k;
+}
+
+/* The planes of cell i's facets, and its edges with the two facets at each: once for all that is summed of the cell. */
+remap_status rm_moments_open(work *w, rm_lid i);
+
+/* File the pieces of edges of mesh 2 under the cells of mesh 1. */
+remap_status rm_moments_file_pieces(work *w);
+
+/* Crossing of that number of an edge of `mesh`. */
+void rm_moments_set_crossing(const work *w, int mesh, int64_t crossing, point *p);
+/* Point k of an edge of `mesh`, where its piece k begins and its piece k - 1 ends. */
+void rm_moments_set_point(const work *w, int mesh, rm_lid e, rm_lid k, point *p);
+
+/* Hand on every side of every polygon in the open cell i. */
+void rm_moments_all_sides(work *w, rm_lid i, sink *add_side);
+
+/* Make ready for sums: once. */
+remap_status rm_moments_ready_sums(work *w);
+/* Slots for all pairs of the open cell i, and their sums in doubles. */
+remap_status rm_moments_sum(work *w, rm_lid i);
+/* Sum the slots marked AGAIN in double-double. */
+remap_status rm_moments_sum_again(work *w, rm_lid i);
 
 /* Forget the polygons of the last source cell. */
 remap_status rm_moments_no_polygons(work *w);

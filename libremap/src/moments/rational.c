@@ -77,14 +77,14 @@ static scaled located(const work *w, const rm_modulus *m, const double *o, const
 
 /* The same in the plane across an axis: where the line p q meets the line c0 c1. */
 static scaled flat_located(const rm_modulus *m, int axis, const double *o, const double *p, const double *q,
-                           const double *const cut[2])
+                           const double *const line[2])
 {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
   uint64_t  u[3], v[3], d[3];
 
   rm_residue_between(m, p, q, u);
-  rm_residue_between(m, cut[0], cut[1], v);
-  rm_residue_between(m, p, cut[0], d);
+  rm_residue_between(m, line[0], line[1], v);
+  rm_residue_between(m, p, line[0], d);
   return along(m, o, p, u, rm_residue_minor(m, d[x], v[y], d[y], v[x]), rm_residue_minor(m, u[x], v[y], u[y], v[x]));
 }
 
