@@ -148,6 +148,7 @@ static void put_face(rows *r, const writer *w, int64_t f, int64_t c)
   const int64_t               other = owner ? w->behind[f] : m->cell_global[m->face_owner[f]];
 
   if (w->with_loops) {
+    put(r, m->face_global[f]);
     put(r, m->face_offset[f + 1] - m->face_offset[f]);
     put_loop(r, m, f, !owner);
   } else {
@@ -176,7 +177,7 @@ rslice_status rslice_cells(MPI_Comm comm, const rslice_content *content, int wit
   rslice_status               status;
 
   status = w.behind && faces_of_cells(m, &w.of) &&
-                   rows_begin(&r, m->num_cells, m->num_cells * (rslice_cell_head(content) + 1) + 2 * (m->num_faces + most))
+                   rows_begin(&r, m->num_cells, m->num_cells * (rslice_cell_head(content) + 1) + 2 * (2 * m->num_faces + most))
                ? RSLICE_OK
                : RSLICE_MEMORY;
   for (int64_t c = 0; status == RSLICE_OK && c < m->num_cells; c++) put_cell(&r, &w, c);

@@ -92,7 +92,7 @@ void rslice_drop(rslice_rows *rows);
 rslice_status rslice_nodes(MPI_Comm comm, const remap_supermesh_view *mesh, rslice_rows *out);
 
 enum { RSLICE_FACE_HEAD = 8 }; /**< words of a row of rslice_faces before the nodes */
-enum { RSLICE_FACE_ORIGIN = 3, RSLICE_FACE_CELL = 4, RSLICE_FACE_NUMBER = 6 };
+enum { RSLICE_FACE_BOUNDARY = 2, RSLICE_FACE_ORIGIN = 3, RSLICE_FACE_CELL = 4, RSLICE_FACE_NUMBER = 6 };
 
 /** The faces: rows {owner, neighbour or -1, boundary or -1, origin, cells of both sides, numbers of both sides, nodes ...},
  *  nodes and cells of the supermesh by global numbers; the normal points out of the owner, which is the lower cell; the loop
@@ -102,7 +102,7 @@ rslice_status rslice_faces(MPI_Comm comm, const rslice_content *content, rslice_
 
 /** The cells: rows {ancestors, volume, fields ..., then their faces}; ancestors as in their fields, numbers bit by bit. Faces
  *  are +-(global number + 1), negative where the normal points into the cell, ascending; or, with loops, they are written out
- *  for VTK: {how many, then for each: how many nodes, nodes ...}, normals pointing out. Collective. */
+ *  for VTK: {how many, then for each: its global number, how many nodes, nodes ...}, normals pointing out. Collective. */
 rslice_status rslice_cells(MPI_Comm comm, const rslice_content *content, int with_loops, rslice_rows *out);
 /** Words of such a row before the faces. Not collective. */
 int64_t rslice_cell_head(const rslice_content *content);

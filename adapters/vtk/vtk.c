@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { POLYHEDRON = 42, FIXED_ARRAYS = 9 };
+enum { POLYHEDRON = 42, FIXED_ARRAYS = 16 };
 
 const char *rvtk_status_text(rvtk_status status)
 {
@@ -66,7 +66,8 @@ static rvtk_status agree(MPI_Comm comm, rvtk_status mine, rvtk_message *message)
 typedef struct array {
   const char *name, *type;
   int         components;  /* 0: not said */
-  int         section;     /* 0 points, 1 cells, 2 cell data */
+  int         section;     /* 0 points, 1 cells, 2 cell data, 3 field data */
+  int64_t     tuples;      /* of field data, on all ranks */
   void       *values;      /* owned */
   int64_t     bytes;       /* of the part */
   int64_t     before, all; /* bytes of the ranks before, of all ranks */
@@ -77,7 +78,7 @@ typedef struct vtu {
   MPI_Comm              comm;
   int                   rank;
   const rslice_content *content;
-  rslice_rows           nodes, cells;
+  rslice_rows           nodes, cells, faces;
   array                *array;
   int                   num_arrays;
 } vtu;
@@ -91,11 +92,7 @@ static void *add_array(vtu *v, const char *name, const char *type, int component
   return a->values;
 }
 
-/* Words of a cell's loops. */
-static int64_t stream_length(const vtu *v, int64_t c)
-{
-  return v->cells.offset[c + 1] - v->cells.offset[c] - rslice_cell_head(v->content);
-}
+/* A cell's faces: how many, then of each its number, how many nodes, nodes. */
 static const int64_t *stream_of(const vtu *v, int64_t c)
 {
   return v->cells.word + v->cells.offset[c] + rslice_cell_head(v->content);
@@ -113,12 +110,12 @@ static int64_t nodes_of(const int64_t *stream, int64_t *out)
 {
   int64_t num = 0, kept = 0;
 
-  for (int64_t f = 0, at = 1; f < stream[0]; f++) {
+  for (int64_t f = 0, at = 2; f < stream[0]; f++) {
     const int64_t n = stream[at++];
 
     memcpy(out + num, stream + at, (size_t)n * sizeof *out);
     num += n;
-    at += n;
+    at += n + 1;
   }
   qsort(out, (size_t)num, sizeof *out, by_number);
   for (int64_t i = 0; i < num; i++)
@@ -126,31 +123,59 @@ static int64_t nodes_of(const int64_t *stream, int64_t *out)
   return kept;
 }
 
+/* The loops of a cell as VTK has them, and apart from them the numbers of its faces. Returns the words of the first. */
+static int64_t split_stream(const int64_t *stream, int64_t *loops, int64_t *number)
+{
+  int64_t words = 0;
+
+  loops[words++] = stream[0];
+  for (int64_t f = 0, at = 1; f < stream[0]; f++) {
+    const int64_t n = stream[at + 1];
+
+    number[f] = stream[at];
+    memcpy(loops + words, stream + at + 1, (size_t)(n + 1) * sizeof *loops);
+    words += n + 1;
+    at += n + 2;
+  }
+  return words;
+}
+
+/* Faces of this rank's cells, each as often as it is a cell's. */
+static int64_t count_faces(const vtu *v)
+{
+  int64_t num = 0;
+
+  for (int64_t c = 0; c < v->cells.num; c++) num += stream_of(v, c)[0];
+  return num;
+}
+
 /* Nodes, loops and where they end, counted over all ranks. Collective. */
 static bool make_topology(vtu *v)
 {
-  const int64_t num = v->cells.num, head = rslice_cell_head(v->content), most = v->cells.offset[num] - num * head;
+  const int64_t num = v->cells.num, num_faces = count_faces(v);
+  const int64_t most = v->cells.offset[num] - num * rslice_cell_head(v->content) - num_faces; /* words of all loops */
   int64_t      *connectivity = add_array(v, "connectivity", "Int64", 0, 1, most, sizeof *connectivity);
   array        *nodes        = &v->array[v->num_arrays - 1];
   int64_t      *offsets      = add_array(v, "offsets", "Int64", 0, 1, num, sizeof *offsets);
   uint8_t      *types        = add_array(v, "types", "UInt8", 0, 1, num, sizeof *types);
   int64_t      *faces        = add_array(v, "faces", "Int64", 0, 1, most, sizeof *faces);
   int64_t      *faceoffsets  = add_array(v, "faceoffsets", "Int64", 0, 1, num, sizeof *faceoffsets);
-  const bool    ok           = connectivity && offsets && types && faces && faceoffsets;
-  int64_t       sum[2] = {0, 0}, before[2] = {0, 0};
+  int64_t      *number       = add_array(v, "CellFaces", "Int64", 0, 3, num_faces, sizeof *number);
+  array        *numbers      = &v->array[v->num_arrays - 1];
+  const bool    ok           = connectivity && offsets && types && faces && faceoffsets && number;
+  int64_t       sum[3] = {0, 0, 0}, before[3] = {0, 0, 0};
 
   for (int64_t c = 0; ok && c < num; c++) {
-    const int64_t n = stream_length(v, c);
-
-    memcpy(faces + sum[1], stream_of(v, c), (size_t)n * sizeof *faces);
     sum[0] += nodes_of(stream_of(v, c), connectivity + sum[0]);
-    sum[1] += n;
+    sum[1] += split_stream(stream_of(v, c), faces + sum[1], number + sum[2]);
+    sum[2] += stream_of(v, c)[0];
     offsets[c]     = sum[0];
     faceoffsets[c] = sum[1];
     types[c]       = POLYHEDRON;
   }
   nodes->bytes = sum[0] * (int64_t)sizeof *connectivity;
-  MPI_Exscan(sum, before, 2, MPI_INT64_T, MPI_SUM, v->comm);
+  MPI_Allreduce(&sum[2], &numbers->tuples, 1, MPI_INT64_T, MPI_SUM, v->comm);
+  MPI_Exscan(sum, before, 3, MPI_INT64_T, MPI_SUM, v->comm);
   for (int64_t c = 0; ok && v->rank && c < num; c++) {
     offsets[c] += before[0];
     faceoffsets[c] += before[1];
@@ -167,6 +192,31 @@ static bool make_data(vtu *v, const char *name, const char *type, int64_t place)
   return values != NULL;
 }
 
+/* One word of each face's head as an array of field data. */
+static bool make_face_data(vtu *v, const char *name, int64_t place)
+{
+  int64_t *values = add_array(v, name, "Int64", 0, 3, v->faces.num, sizeof *values);
+
+  for (int64_t f = 0; values && f < v->faces.num; f++) values[f] = v->faces.word[v->faces.offset[f] + place];
+  v->array[v->num_arrays - 1].tuples = v->content->mesh->global_faces;
+  return values != NULL;
+}
+
+/* What belongs to faces, by their numbers. */
+static bool make_faces(vtu *v)
+{
+  static const char *const cell[2] = {"FaceCellA", "FaceCellB"}, *const number[2] = {"FaceNumberA", "FaceNumberB"};
+  bool                     ok      = make_face_data(v, "FaceLiesIn", RSLICE_FACE_ORIGIN);
+
+  if (v->content->num_boundaries) ok = make_face_data(v, "FaceBoundary", RSLICE_FACE_BOUNDARY) && ok;
+  for (int side = 0; side < 2; side++) {
+    if (!v->content->face_cell[side] || !v->content->face_number[side]) continue;
+    ok = make_face_data(v, cell[side], RSLICE_FACE_CELL + side) && ok;
+    ok = make_face_data(v, number[side], RSLICE_FACE_NUMBER + side) && ok;
+  }
+  return ok;
+}
+
 /* Every array, v->array being there. Collective, whatever happens. */
 static bool make_arrays(vtu *v)
 {
@@ -179,7 +229,7 @@ static bool make_arrays(vtu *v)
   for (int side = 0; side < 2; side++) ok = make_data(v, content->ancestor[side], "Int64", side) && ok;
   ok = make_data(v, "Volume", "Float64", 2) && ok;
   for (int k = 0; k < content->num_fields; k++) ok = make_data(v, content->field[k].name, "Float64", 3 + k) && ok;
-  return ok;
+  return make_faces(v) && ok;
 }
 
 /* Where each rank's part of each array goes. Collective. */
@@ -207,6 +257,19 @@ static void put_name(FILE *out, const char *name)
   }
 }
 
+/* Names of boundaries as VTK writes texts: the characters' codes, each text ended by 0. */
+static void put_boundary_names(FILE *out, const rslice_content *content)
+{
+  if (!content->num_boundaries) return;
+  fprintf(out, "        <DataArray type=\"String\" Name=\"BoundaryName\" NumberOfTuples=\"%d\" format=\"ascii\">\n",
+          content->num_boundaries);
+  for (int b = 0; b < content->num_boundaries; b++) {
+    for (const char *c = content->boundary_name[b]; *c; c++) fprintf(out, "%d ", (unsigned char)*c);
+    fprintf(out, "0\n");
+  }
+  fprintf(out, "        </DataArray>\n");
+}
+
 static void put_section(FILE *out, const vtu *v, int section, const char *name)
 {
   int64_t at = 0;
@@ -220,10 +283,12 @@ static void put_section(FILE *out, const vtu *v, int section, const char *name)
       put_name(out, a->name);
       fputc('"', out);
       if (a->components) fprintf(out, " NumberOfComponents=\"%d\"", a->components);
+      if (section == 3) fprintf(out, " NumberOfTuples=\"%lld\"", (long long)a->tuples);
       fprintf(out, " format=\"appended\" offset=\"%lld\"/>\n", (long long)at);
     }
     at += (int64_t)sizeof(uint64_t) + a->all;
   }
+  if (section == 3) put_boundary_names(out, v->content);
   fprintf(out, "      </%s>\n", name);
 }
 
@@ -237,8 +302,10 @@ static char *make_xml(const vtu *v, size_t *size)
   if (!out) return NULL;
   fprintf(out,
           "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"%s\" "
-          "header_type=\"UInt64\">\n  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"%lld\" NumberOfCells=\"%lld\">\n",
-          *(const uint8_t *)&one ? "LittleEndian" : "BigEndian", (long long)v->content->mesh->global_nodes,
+          "header_type=\"UInt64\">\n  <UnstructuredGrid>\n",
+          *(const uint8_t *)&one ? "LittleEndian" : "BigEndian");
+  put_section(out, v, 3, "FieldData");
+  fprintf(out, "    <Piece NumberOfPoints=\"%lld\" NumberOfCells=\"%lld\">\n", (long long)v->content->mesh->global_nodes,
           (long long)v->content->mesh->global_cells);
   put_section(out, v, 0, "Points");
   put_section(out, v, 1, "Cells");
@@ -357,6 +424,7 @@ rvtk_status rvtk_write(MPI_Comm comm, const char *path, const rslice_content *co
   MPI_Comm_rank(comm, &v.rank);
   status = from_slices(rslice_nodes(comm, content->mesh, &v.nodes), path, message);
   if (status == RVTK_OK) status = from_slices(rslice_cells(comm, content, 1, &v.cells), path, message);
+  if (status == RVTK_OK) status = from_slices(rslice_faces(comm, content, &v.faces), path, message);
   if (status == RVTK_OK) {
     v.array = calloc((size_t)(FIXED_ARRAYS + content->num_fields), sizeof *v.array);
     status  = agree(comm, v.array ? RVTK_OK : no_memory(path, message), message);
@@ -373,6 +441,7 @@ rvtk_status rvtk_write(MPI_Comm comm, const char *path, const rslice_content *co
   free(v.array);
   free(xml);
   rslice_drop(&v.nodes);
+  rslice_drop(&v.faces);
   rslice_drop(&v.cells);
   return status;
 }

@@ -41,8 +41,10 @@ const char *rvtk_status_text(rvtk_status status);
 int rvtk_is_path(const char *path);
 
 /** Write the supermesh to `path`, which appears when it is complete and is replaced if it exists. The bytes do not depend on
- *  the number of ranks. Boundaries are left out: the format has cells only. message, never NULL, holds one line after a
- *  failure. Collective on comm. Errors: IO, MEMORY, INTERNAL. */
+ *  the number of ranks. The format has data of cells only, so what faces have is field data: "CellFaces", the faces' numbers in
+ *  the order of the cells' faces, and by these numbers "FaceBoundary" (-1: none; its name in "BoundaryName"), "FaceLiesIn",
+ *  "FaceCellA", "FaceNumberA", "FaceCellB", "FaceNumberB": the words of rslice_faces, cells and numbers where they are known.
+ *  message, never NULL, holds one line after a failure. Collective on comm. Errors: IO, MEMORY, INTERNAL. */
 rvtk_status rvtk_write(MPI_Comm comm, const char *path, const rslice_content *content, rvtk_message *message);
 
 #ifdef __cplusplus

@@ -5,7 +5,7 @@
  *   bl_free(b);
  *
  * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. Every face lies in one of the source, every
- * third in one of the target. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the
+ * third in one of the target: face g of cell g + 1, called 100 + g, and of cell g / 2 + 1, called g % 6 + 1. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the
  * program. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
@@ -115,6 +115,9 @@ static inline int64_t *bl_faces(bl_blocks *b, const int32_t *local)
   int32_t *owner = bl_alloc(b, most, sizeof *owner), *neighbour = bl_alloc(b, most, sizeof *neighbour),
           *beyond_face = bl_alloc(b, most, sizeof *beyond_face), *boundary = bl_alloc(b, most, sizeof *boundary), *from[2];
 
+  int64_t *face[4]; /* cells and numbers of both sides */
+
+  for (int k = 0; k < 4; k++) face[k] = bl_alloc(b, most, sizeof *face[k]);
   for (int side = 0; side < 2; side++) v->face_from[side] = from[side] = bl_alloc(b, most, sizeof *from[side]);
   for (int64_t g = 0; g < most; g++) {
     int64_t       at[3], cell[2], node[4];
@@ -127,6 +130,10 @@ static inline int64_t *bl_faces(bl_blocks *b, const int32_t *local)
     for (int i = 0; i < 4; i++) loop[4 * f + i] = node[out ? 3 - i : i];
     global[f]    = g;
     from[1][f]   = g % 3 ? -1 : 0;
+    face[0][f]   = g + 1;
+    face[1][f]   = g % 3 ? 0 : g / 2 + 1;
+    face[2][f]   = 100 + g;
+    face[3][f]   = g % 3 ? 0 : g % 6 + 1;
     owner[f]     = local[cell[out]];
     neighbour[f] = cell[1 - out] < 0 ? -1 : local[cell[1 - out]];
     boundary[f]  = cell[1 - out] < 0 ? 2 * axis + !out : -1;
@@ -142,6 +149,7 @@ static inline int64_t *bl_faces(bl_blocks *b, const int32_t *local)
   v->face_neighbour        = neighbour;
   v->beyond_face           = beyond_face;
   v->beyond_cell           = beyond_cell;
+  for (int side = 0; side < 2; side++) b->content.face_cell[side] = face[side], b->content.face_number[side] = face[2 + side];
   b->content.face_boundary = boundary;
   return loop;
 }

@@ -52,6 +52,8 @@ static void the_arrays_are_what_the_head_says(void)
   const char   *data;
   uint64_t      bytes;
   const int64_t offsets[2] = {8, 16}, ends[2] = {31, 62}, ancestors[2] = {1, 0};
+  const int64_t faces[12] = {0, 1, 3, 5, 7, 9, 1, 2, 4, 6, 8, 10};
+  const int64_t numbers[11] = {1, 0, 0, 4, 0, 0, 1, 0, 0, 4, 0}, cells[11] = {1, 0, 0, 2, 0, 0, 4, 0, 0, 5, 0};
   const double  values[2] = {0, 1.5};
   FILE         *in;
 
@@ -68,6 +70,14 @@ static void the_arrays_are_what_the_head_says(void)
     RT_CHECK(data && bytes == 16 && !memcmp(data, ancestors, 16));
     data = array_of(text, "Number", &bytes);
     RT_CHECK(data && bytes == 16 && !memcmp(data, values, 16));
+    data = array_of(text, "CellFaces", &bytes);
+    RT_CHECK(data && bytes == 96 && !memcmp(data, faces, 96));
+    data = array_of(text, "FaceBoundary", &bytes);
+    RT_CHECK(data && bytes == 88 && ((const int64_t *)(const void *)data)[0] >= -1);
+    data = array_of(text, "FaceNumberB", &bytes);
+    RT_CHECK(data && bytes == 88 && !memcmp(data, numbers, 88));
+    data = array_of(text, "FaceCellB", &bytes);
+    RT_CHECK(data && bytes == 88 && !memcmp(data, cells, 88));
     data = array_of(text, "types", &bytes);
     RT_CHECK(data && bytes == 2 && data[0] == 42 && data[1] == 42);
     remove(path);
@@ -87,7 +97,7 @@ static void a_place_that_cannot_be_written_is_told_and_nothing_is_left(void)
 static void vtk_reads_polyhedra_of_the_right_volume(void)
 {
   bl_blocks *b = bl_new((int[]){3, 2, 4}, rt_rank(), rt_size());
-  char       path[64], command[900];
+  char       path[64], command[1800];
   int        none;
 
   RT_EQ(rvtk_write(MPI_COMM_WORLD, path_of(path, "read"), &b->content, &why), RVTK_OK);
@@ -102,7 +112,12 @@ static void vtk_reads_polyhedra_of_the_right_volume(void)
         "f.Update()\ng = f.GetOutput()\nv = g.GetCellData().GetArray(\"Volume\")\na = g.GetCellData().GetArray(\"AncestorA\")\n"
         "assert g.GetNumberOfCells() == 24 and g.GetNumberOfPoints() == 60\n"
         "assert all(abs(v.GetValue(i) - 1) < 1e-12 for i in range(24))\n"
-        "assert [a.GetValue(i) for i in range(24)] == list(range(1, 25))'",
+        "assert [a.GetValue(i) for i in range(24)] == list(range(1, 25))\n"
+        "h = lambda n: [d.GetAbstractArray(n).GetValue(i) for i in range(d.GetAbstractArray(n).GetNumberOfTuples())]\n"
+        "d = r.GetOutput().GetFieldData()\nn = h(\"BoundaryName\")\nb = h(\"FaceBoundary\")\nc = h(\"CellFaces\")\n"
+        "assert n == [\"left\", \"right\", \"front\", \"back\", \"a very long name with / in it, 40 letters\", \"top\"]\n"
+        "assert len(c) == 144 and len(b) == len(set(c)) and sum(x < 0 for x in b) == len(c) - len(b)\n"
+        "assert h(\"FaceNumberA\") == [100 + g for g in range(len(b))]'",
         path);
     RT_EQ(system(command), 0);
   }
