@@ -49,65 +49,24 @@ done:
 
 /* ---- visitors ----------------------------------------------------------------------------------------------------- */
 
-/* What a source's query adds to: the ranks it has met. */
-typedef struct meeting {
-  const rm_crowds *crowds;
-  int64_t         *next; /* [comm->size] how many sources meet a rank, or where the next one goes */
-  rm_lid          *last; /* [comm->size] the tag that met a rank last                             */
-  rm_lid          *list; /* where the tags go, or NULL to count                                   */
-  rm_lid           tag;  /* the one that asks                                                     */
-} meeting;
-
-/* A source meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
-static int meet_rank(void *user, rm_lid item)
-{
-  meeting      *m    = user;
-  const int64_t rank = m->crowds->crowd[item].rank;
-
-  if (m->last[rank] == m->tag) return 0;
-  m->last[rank] = m->tag;
-  if (m->list) m->list[m->next[rank]] = m->tag;
-  m->next[rank]++;
-  return 0;
-}
-
-/* Every small source seated here asks which crowds of other ranks it meets. */
-static void meet_all(const rm_comm *comm, const rm_tags *tags, meeting *m)
-{
-  for (int r = 0; r < comm->size; r++) m->last[r] = -1;
-  for (rm_lid k = 0; k < tags->num[REMAP_SOURCE]; k++) {
-    if (tags->tag[REMAP_SOURCE][k].is_giant) continue;
-    m->tag              = k;
-    m->last[comm->rank] = k;
-    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, tags->box[REMAP_SOURCE][k], meet_rank, m);
-  }
-}
-
-/* The visitors to other ranks: counted in a first walk, listed in a second, so that the list needs no more room than it has
- * entries; offset is [comm->size + 1]. Not collective. */
+/* The visitors to other ranks; offset is [comm->size + 1]. Not collective. */
 static remap_status list_visitors(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_crowds *crowds,
                                   int64_t *offset, rm_visitor **out, double (**box)[6])
 {
-  meeting m = {.crowds = crowds};
-  rm_lid *list;
-  int64_t num;
+  const double(*tag_box)[6] = (const double(*)[6])tags->box[REMAP_SOURCE];
+  rm_lid *small, *list, num = 0;
 
-  RM_NEW(m.last, arena, comm->size);
-  RM_NEW0(m.next, arena, comm->size);
-  meet_all(comm, tags, &m);
-  for (int r = 0; r < comm->size; r++) offset[r] = m.next[r];
-  num = rm_offsets(offset, comm->size);
-  RM_NEW(list, arena, num);
-  RM_NEW(*out, arena, num);
-  RM_NEW(*box, arena, num);
-  for (int r = 0; r < comm->size; r++) m.next[r] = offset[r];
-  m.list = list;
-  meet_all(comm, tags, &m);
-  for (int64_t k = 0; k < num; k++) {
+  RM_NEW(small, arena, tags->num[REMAP_SOURCE]);
+  for (rm_lid k = 0; k < tags->num[REMAP_SOURCE]; k++)
+    if (!tags->tag[REMAP_SOURCE][k].is_giant) small[num++] = k;
+  RM_TRY(rm_crowds_list(arena, comm, crowds, comm->rank, num, small, tag_box, offset, &list));
+  RM_NEW(*out, arena, offset[comm->size]);
+  RM_NEW(*box, arena, offset[comm->size]);
+  for (int64_t k = 0; k < offset[comm->size]; k++) {
     const rm_tag *tag = &tags->tag[REMAP_SOURCE][list[k]];
 
     (*out)[k] = (rm_visitor){tag->home_rank, tag->cell, tag->num_triangles, tag->fill};
-    memcpy((*box)[k], tags->box[REMAP_SOURCE][list[k]], sizeof **box);
+    memcpy((*box)[k], tag_box[list[k]], sizeof **box);
   }
   return REMAP_OK;
 }

@@ -40,58 +40,13 @@ static remap_status plant(rm_arena *arena, const rm_comm *comm, targets *t, rm_r
   return rm_boxtree_build(arena, (rm_lid)num, t->box, &t->tree);
 }
 
-/* What a source cell's query adds to: the ranks it has met. */
-typedef struct meeting {
-  const rm_crowds *crowds;
-  int64_t         *next;      /* [comm->size] how many cells meet a rank, or where the next one goes */
-  rm_lid          *last_cell; /* [comm->size] the cell that met a rank last                          */
-  rm_lid          *list;      /* where the cells go, or NULL to count                                */
-  rm_lid           cell;      /* the one that asks                                                   */
-} meeting;
-
-/* A source cell meets a crowd: it meets the crowd's rank, which counts once however many of its crowds it meets. */
-static int meet_rank(void *user, rm_lid item)
-{
-  meeting      *m    = user;
-  const int64_t rank = m->crowds->crowd[item].rank;
-
-  if (m->last_cell[rank] == m->cell) return 0;
-  m->last_cell[rank] = m->cell;
-  if (m->list) m->list[m->next[rank]] = m->cell;
-  m->next[rank]++;
-  return 0;
-}
-
-/* Every source cell of the zone asks which crowds it meets. */
-static void meet_all(const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone, meeting *m)
-{
-  for (int r = 0; r < comm->size; r++) m->last_cell[r] = -1;
-  for (rm_lid k = 0; k < zone->num_cells[REMAP_SOURCE]; k++) {
-    m->cell = zone->cell[REMAP_SOURCE][k];
-    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, mesh->cell_box[m->cell], meet_rank, m);
-  }
-}
-
-/* The source cells that meet a crowd of a rank's targets: counted in a first walk, listed in a second, so that the list needs
- * no more room than it has entries. Not collective. */
+/* The source cells that meet a crowd of a rank's targets. Not collective. */
 static remap_status list_candidates(rm_arena *arena, const rm_comm *comm, const rm_mesh *mesh, const rm_zone *zone,
                                     const rm_crowds *crowds, rm_route *route)
 {
-  meeting m = {.crowds = crowds};
-
-  RM_NEW(m.last_cell, arena, comm->size);
-  RM_NEW(m.next, arena, comm->size);
-  RM_NEW0(route->offset, arena, (int64_t)comm->size + 1);
-
-  for (int r = 0; r < comm->size; r++) m.next[r] = 0;
-  meet_all(comm, mesh, zone, &m);
-  for (int r = 0; r < comm->size; r++) route->offset[r] = m.next[r];
-  RM_NEW(route->cell, arena, rm_offsets(route->offset, comm->size));
-
-  for (int r = 0; r < comm->size; r++) m.next[r] = route->offset[r];
-  m.list = route->cell;
-  meet_all(comm, mesh, zone, &m);
-  return REMAP_OK;
+  RM_NEW(route->offset, arena, (int64_t)comm->size + 1);
+  return rm_crowds_list(arena, comm, crowds, -1, zone->num_cells[REMAP_SOURCE], zone->cell[REMAP_SOURCE], mesh->cell_box,
+                        route->offset, &route->cell);
 }
 
 /* For each of n boxes, whether it meets a target of this rank; and room for the offsets of the answers that come back here.

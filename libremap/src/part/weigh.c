@@ -190,52 +190,15 @@ static remap_status list_faces(rm_arena *scratch, const rm_mesh *mesh, int64_t n
   return REMAP_OK;
 }
 
-/* A face of a giant meets the crowds of some ranks, each of which counts once. */
-typedef struct meeting {
-  const rm_crowds *crowds;
-  int64_t         *next;      /* [comm->size] how many faces meet a rank, or where the next one goes */
-  rm_lid          *last_face; /* [comm->size] the face that met a rank last                          */
-  double         (*list)[6];  /* where the faces go, or NULL to count                                */
-  rm_lid           face;
-  const double    *box;       /* its box */
-} meeting;
-
-static int meet_rank(void *user, rm_lid item)
-{
-  meeting      *m    = user;
-  const int64_t rank = m->crowds->crowd[item].rank;
-
-  if (m->last_face[rank] == m->face) return 0;
-  m->last_face[rank] = m->face;
-  if (m->list) memcpy(m->list[m->next[rank]], m->box, sizeof *m->list);
-  m->next[rank]++;
-  return 0;
-}
-
-/* Every face asks which crowds it meets. */
-static void meet_all(const rm_comm *comm, rm_lid num, const double (*box)[6], meeting *m)
-{
-  for (int r = 0; r < comm->size; r++) m->last_face[r] = -1;
-  for (m->face = 0; m->face < num; m->face++) {
-    m->box = box[m->face];
-    (void)rm_boxtree_query(m->crowds->tree, m->crowds->box, m->box, meet_rank, m);
-  }
-}
-
 /* The boxes of faces by the ranks whose crowds they meet; offset is [comm->size + 1]. Not collective. */
 static remap_status deal_faces(rm_arena *scratch, const rm_comm *comm, rm_lid num, const double (*box)[6],
                                const rm_crowds *crowds, int64_t *offset, double (**out)[6])
 {
-  meeting m = {.crowds = crowds};
+  rm_lid *face;
 
-  RM_NEW0(m.next, scratch, comm->size);
-  RM_NEW(m.last_face, scratch, comm->size);
-  meet_all(comm, num, box, &m);
-  for (int r = 0; r < comm->size; r++) offset[r] = m.next[r];
-  RM_NEW(*out, scratch, rm_offsets(offset, comm->size));
-  for (int r = 0; r < comm->size; r++) m.next[r] = offset[r];
-  m.list = *out;
-  meet_all(comm, num, box, &m);
+  RM_TRY(rm_crowds_list(scratch, comm, crowds, -1, num, NULL, box, offset, &face));
+  RM_NEW(*out, scratch, offset[comm->size]);
+  for (int64_t k = 0; k < offset[comm->size]; k++) memcpy((*out)[k], box[face[k]], sizeof **out);
   return REMAP_OK;
 }
 

@@ -342,3 +342,53 @@ remap_status rm_crowds_meet_labelled(rm_arena *arena, const rm_comm *comm, rm_li
   rm_arena_drop(own.scratch);
   return rm_comm_agree(comm, mine, NULL);
 }
+
+/* ---- whose crowds a box meets ------------------------------------------------------------------------------------- */
+
+/* What a box's query adds to: the ranks it has met. */
+typedef struct listing {
+  const rm_crowds *crowds;
+  int64_t         *next; /* [comm->size] how many boxes meet a rank, or where the next one goes */
+  rm_lid          *last; /* [comm->size] the box that met a rank last                           */
+  rm_lid          *item; /* where the boxes go, or NULL to count                                */
+  rm_lid           box;  /* the one that asks                                                   */
+} listing;
+
+/* A rank counts once, however many of its crowds a box meets. */
+static int list_rank(void *user, rm_lid crowd)
+{
+  listing      *l    = user;
+  const int64_t rank = l->crowds->crowd[crowd].rank;
+
+  if (l->last[rank] == l->box) return 0;
+  l->last[rank] = l->box;
+  if (l->item) l->item[l->next[rank]] = l->box;
+  l->next[rank]++;
+  return 0;
+}
+
+static void list_all(const rm_comm *comm, int left_out, rm_lid num, const rm_lid *which, const double (*box)[6], listing *l)
+{
+  for (int r = 0; r < comm->size; r++) l->last[r] = -1;
+  for (rm_lid k = 0; k < num; k++) {
+    l->box = which ? which[k] : k;
+    if (left_out >= 0) l->last[left_out] = l->box;
+    (void)rm_boxtree_query(l->crowds->tree, l->crowds->box, box[l->box], list_rank, l);
+  }
+}
+
+remap_status rm_crowds_list(rm_arena *arena, const rm_comm *comm, const rm_crowds *crowds, int left_out, rm_lid num,
+                            const rm_lid *which, const double (*box)[6], int64_t *offset, rm_lid **item)
+{
+  listing l = {.crowds = crowds};
+
+  RM_NEW(l.last, arena, comm->size);
+  RM_NEW0(l.next, arena, comm->size);
+  list_all(comm, left_out, num, which, box, &l);
+  for (int r = 0; r < comm->size; r++) offset[r] = l.next[r];
+  RM_NEW(*item, arena, rm_offsets(offset, comm->size));
+  for (int r = 0; r < comm->size; r++) l.next[r] = offset[r];
+  l.item = *item;
+  list_all(comm, left_out, num, which, box, &l);
+  return REMAP_OK;
+}

@@ -79,6 +79,13 @@ remap_status rm_crowds_meet_labelled(rm_arena *arena, const rm_comm *comm, rm_li
                                      const rm_lid *label, rm_lid num_asking, const double (*asking)[6], rm_lid most,
                                      rm_crowds *out);
 
+/* The boxes that meet crowds of each rank, but for the rank left_out (-1: of all): which[num] of them ask, in order, or the
+ * first num if it is NULL. offset is [comm->size + 1], *item, [offset[comm->size]], lives in arena: boxes grouped by rank, in
+ * the order in which they ask. Counted in a first walk and listed in a second, so that no more room is taken than there are
+ * entries. Not collective. O(num log B) mostly. */
+remap_status rm_crowds_list(rm_arena *arena, const rm_comm *comm, const rm_crowds *crowds, int left_out, rm_lid num,
+                            const rm_lid *which, const double (*box)[6], int64_t *offset, rm_lid **item);
+
 /* Read-only once built. Invariants: listed cells ascend; a cell that is not listed meets no cell box of the other mesh. */
 typedef struct rm_zone {
   rm_lid         num_cells[2]; /* [side]                                                            */
