@@ -84,7 +84,7 @@ static void lend(world *w, MPI_Comm comm, const remap_options *options, uint64_t
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &size);
   RT_EQ(remap_create(comm, options, &w->ctx), REMAP_OK);
-  if (triangles) w->ctx->slicing = (rm_slicing){triangles, INFINITY};
+  if (triangles) w->ctx->slicing = (rm_slicing){.triangles = triangles, .repeats = INFINITY};
   if (triangles) w->ctx->slice = triangles / 4;
   for (int side = 0; side < 2; side++) {
     tm_mesh *whole = make(side, seed);

@@ -28,7 +28,7 @@ static void for_all_worlds(void (*check)(world *w))
   for (int kind = 0; kind < pairs_num_kinds(); kind++) {
     world w;
 
-    open_world(&w, kind, kind % PAIRS_NUM_DEALS, (rm_slicing){100, INFINITY});
+    open_world(&w, kind, kind % PAIRS_NUM_DEALS, (rm_slicing){.triangles = 100, .repeats = INFINITY});
     check(&w);
     pairs_close(&w.in);
   }
@@ -121,8 +121,8 @@ static int64_t most_blocks(int kind, rm_slicing slicing)
 static void sources_that_meet_everything_make_one_block(void)
 {
   for (int kind = 0; kind < pairs_num_kinds(); kind++) {
-    const int64_t many = most_blocks(kind, (rm_slicing){100, INFINITY});
-    const int64_t few  = most_blocks(kind, (rm_slicing){100, 0.0}); /* no triangle may come twice */
+    const int64_t many = most_blocks(kind, (rm_slicing){.triangles = 100, .repeats = INFINITY});
+    const int64_t few  = most_blocks(kind, (rm_slicing){.triangles = 100}); /* no triangle may come twice */
 
     RT_CHECK(few <= many);
     if (kind == PAIRS_PARTLY) RT_CHECK(many > 1 && few == 1);

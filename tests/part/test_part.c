@@ -485,7 +485,7 @@ static remap_status run_stages(world *w, rm_arena *arena)
   int64_t       *work[2];
 
   RM_TRY(rm_part_cut_evenly(arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts));
-  RM_TRY(rm_part_send_tags(arena, arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts, &tags, &reason));
+  RM_TRY(rm_part_send_tags(arena, comm, &w->in.frame, w->in.mesh, w->zone, &cuts, &tags, &reason));
   RM_TRY(rm_part_find_giants(arena, comm, &tags, &giants));
   RM_TRY(rm_part_weigh(arena, arena, comm, w->in.mesh, &tags, &giants, work));
   RM_TRY(rm_part_cut_work(arena, comm, &tags, work, &cuts));

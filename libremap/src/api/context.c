@@ -77,7 +77,7 @@ remap_status remap_create(MPI_Comm comm, const remap_options *options, remap_con
     (void)rm_comm_max_i64(&own, unused, 8);
   }
   if (ctx) ctx->comm = own;
-  if (ctx) ctx->slicing = (rm_slicing){RM_BLOCK_TRIANGLES, RM_BLOCK_REPEATS};
+  if (ctx) ctx->slicing = (rm_slicing){RM_BLOCK_TRIANGLES, RM_BLOCK_REPEATS, RM_BLOCKS, RM_BLOCK_FEW};
   if (ctx) ctx->slice = RM_SLICE_PAIRS;
   if (status == REMAP_OK) status = rm_context_meet_few(ctx);
   status = rm_comm_agree(&own, status, NULL);

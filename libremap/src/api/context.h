@@ -31,9 +31,10 @@ typedef struct rm_place {
 } rm_place;
 
 /* What a rank overlays at once at most: about 3300 hexahedra of either mesh, for which the overlay takes 12 MB with diagonal
- * faces, 21 MB with centres; and how many triangles may come twice for that. Pairs that go home at once, at least: of 200 bytes
+ * faces, 21 MB with centres; and how many triangles may come twice for that. Less on small
+ * ranks, for what they take to fall with their number. Pairs that go home at once, at least: of 200 bytes
  * while they do. */
-enum { RM_BLOCK_TRIANGLES = 80000, RM_SLICE_PAIRS = 20000 };
+enum { RM_BLOCK_TRIANGLES = 80000, RM_BLOCKS = 20, RM_BLOCK_FEW = 30000, RM_SLICE_PAIRS = 20000 };
 #define RM_BLOCK_REPEATS 0.5
 
 /* Calls that all ranks make together, or among neighbours. */

@@ -254,6 +254,11 @@ static remap_status make_rows(job *j, rm_arrivals *a, remap_side side)
   passing = rm_arena_new();
   place   = passing ? rm_arena_alloc(passing, a->num, sizeof *place) : NULL;
   RM_GOTO(done, status = arrange(j, a, side, place));
+  if (side == REMAP_SOURCE) { /* nobody asks for the places of its pairs */
+    rm_arena_drop(passing);
+    passing = NULL;
+    place   = NULL;
+  }
   status = rm_comm_agree(j->comm, fill_rows(j, a, side, place), NULL);
   publish(draft, rows);
 done:

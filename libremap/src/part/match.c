@@ -50,22 +50,48 @@ typedef struct here {
 
 /* ---- blocks ------------------------------------------------------------------------------------------------------- */
 
-/* Keys at which this rank's tags, of both sides and in order, are cut into num blocks with about as many triangles each. */
+/* The highest bit in which two keys differ: the level at which the curve's octants part them. */
+static int level_between(uint64_t a, uint64_t b)
+{
+  int level = 0;
+
+  for (uint64_t bits = a ^ b; bits > 1; bits /= 2) level++;
+  return level;
+}
+
+/* Keys at which this rank's tags, of both sides and in order, are cut into num blocks with about as many triangles each: within
+ * a quarter of a block from where that would be, between the largest octants, for blocks are compact then. */
 static remap_status cut_inside(rm_arena *arena, const rm_tags *tags, int64_t all, int64_t num, rm_cuts *out)
 {
-  rm_lid    at[2] = {0, 0};
-  int64_t   sum = 0;
-  uint64_t *key;
+  const int64_t size = all / num;
+  rm_lid        at[2] = {0, 0};
+  int64_t       sum = 0;
+  int           best = -1; /* level of the cut that is chosen so far */
+  uint64_t     *key, last = 0;
 
   RM_NEW(key, arena, num);
   *out = (rm_cuts){0, key};
   while (out->num < num - 1 && (at[0] < tags->num[0] || at[1] < tags->num[1])) {
     const int     side = at[0] == tags->num[0] || (at[1] < tags->num[1] && tags->tag[1][at[1]].key < tags->tag[0][at[0]].key);
     const rm_tag *tag  = &tags->tag[side][at[side]++];
+    const int64_t past = sum - (out->num + 1) * size;
 
-    if (sum >= (out->num + 1) * (all / num) && (out->num == 0 || tag->key > key[out->num - 1])) key[out->num++] = tag->key;
+    if (tag->key > last && sum > 0 && past >= -(size / 4)) {
+      const int level = level_between(last, tag->key);
+
+      if (level > best && (past <= size / 4 || best < 0)) {
+        best          = level;
+        key[out->num] = tag->key;
+      }
+      if (past >= size / 4) {
+        out->num++;
+        best = -1;
+      }
+    }
+    last = tag->key;
     sum += tag->num_triangles;
   }
+  out->num += best >= 0;
   return REMAP_OK;
 }
 
@@ -247,7 +273,7 @@ static void drop_blocks(here *h)
   h->once = h->often = 0;
 }
 
-/* Cut into as few blocks as have no more triangles each than asked for, about; into fewer where too many sources would come
+/* Cut into as few blocks as are asked for and have no more triangles each than that, about; into fewer where too many sources would come
  * more than once, for what meets many blocks is triangulated with each of them. Not collective. */
 static remap_status choose_blocks(here *h, const rm_slicing *slicing)
 {
@@ -255,7 +281,8 @@ static remap_status choose_blocks(here *h, const rm_slicing *slicing)
 
   for (int side = 0; side < 2; side++)
     for (rm_lid k = 0; k < h->tags->num[side]; k++) all = rm_add_sat(all, h->tags->tag[side][k].num_triangles);
-  num = all / slicing->triangles + 1;
+  num = slicing->few > 0 && all / slicing->few < slicing->blocks ? all / slicing->few : slicing->blocks;
+  num = num > all / slicing->triangles ? num : all / slicing->triangles + 1;
   for (num = num < MOST_BLOCKS ? num : MOST_BLOCKS;; num /= 2) {
     h->arena = rm_arena_new();
     if (!h->arena) return REMAP_NO_MEMORY;

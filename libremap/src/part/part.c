@@ -4,21 +4,39 @@
 #include "part/part_private.h"
 
 #include <math.h>
+#include <string.h>
 
-const rm_slicing rm_one_block = {INT64_MAX, INFINITY};
+const rm_slicing rm_one_block = {INT64_MAX, INFINITY, 1, 1};
 
-/* Weigh the tags where they are, and move them into intervals of even work. Collective. *moved lives in arena. */
+/* Cuts of even work; the giants of these tags, which are marked, end here but for their number. Collective. The cuts live in
+ * arena. */
+static remap_status cut_work(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], rm_tags *tags,
+                             rm_giants *giants, rm_cuts *cuts)
+{
+  rm_arena    *scratch = rm_arena_new();
+  uint64_t    *key     = rm_arena_alloc(arena, comm->size, sizeof *key);
+  int64_t     *work[2];
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch && key ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_find_giants(scratch, comm, tags, giants));
+  RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, mesh, tags, giants, work));
+  RM_GOTO(done, status = rm_part_cut_work(scratch, comm, tags, work, cuts));
+  cuts->key = memcpy(key, cuts->key, (size_t)cuts->num * sizeof *key);
+done:
+  rm_arena_drop(scratch);
+  return status;
+}
+
+/* Weigh the tags where they are, and move them into intervals of even work. Collective. What comes out lives in arena. */
 static remap_status balance(rm_arena *arena, const rm_comm *comm, const rm_mesh *const mesh[2], rm_tags *tags,
                             rm_giants *giants, rm_cuts *cuts, rm_tags *moved, rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new();
-  int64_t     *work[2];
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_GOTO(done, status = rm_part_find_giants(scratch, comm, tags, giants));
-  RM_GOTO(done, status = rm_part_weigh(scratch, scratch, comm, mesh, tags, giants, work));
-  RM_GOTO(done, status = rm_part_cut_work(arena, comm, tags, work, cuts));
+  RM_GOTO(done, status = cut_work(arena, comm, mesh, tags, giants, cuts));
   RM_GOTO(done, status = rm_part_move_tags(arena, comm, tags, cuts, moved, reason));
   if (giants->num_everywhere > 0) {
     status = rm_part_meet_giants(arena, scratch, comm, moved, giants);
@@ -30,40 +48,46 @@ done:
   return status;
 }
 
-/* The tags of the zone's cells on the ranks where they are of even number. Collective. *out lives in arena. */
+/* The tags of the zone's cells on the ranks where they are of even number. Collective. *out lives in arena, as do the cuts. */
 static remap_status seat_evenly(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
                                 const rm_zone *zone, rm_cuts *cuts, rm_tags *out, rm_reason *reason)
 {
   rm_arena    *scratch = rm_arena_new();
+  uint64_t    *key     = rm_arena_alloc(arena, comm->size, sizeof *key);
   remap_status status;
 
-  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  RM_GOTO(done, status = rm_part_cut_evenly(arena, comm, zone_frame, mesh, zone, cuts));
-  RM_GOTO(done, status = rm_part_send_tags(arena, scratch, comm, zone_frame, mesh, zone, cuts, out, reason));
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch && key ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_cut_evenly(scratch, comm, zone_frame, mesh, zone, cuts));
+  cuts->key = memcpy(key, cuts->key, (size_t)cuts->num * sizeof *key);
+  rm_arena_drop(scratch);
+  scratch = NULL;
+  status  = rm_part_send_tags(arena, comm, zone_frame, mesh, zone, cuts, out, reason);
 done:
   rm_arena_drop(scratch);
   return status;
 }
 
-/* One rank needs no balance. Collective. */
-static remap_status plan(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *frame,
-                         const rm_mesh *const mesh[2], const rm_zone *zone, const rm_slicing *slicing, rm_routes *out,
-                         rm_reason *reason)
+/* Where the tags end up, and the giants; one rank needs no balance. Collective. All live in arena. */
+static remap_status seat(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
+                         const rm_zone *zone, rm_giants *giants, rm_cuts *cuts, rm_tags *out, rm_reason *reason)
 {
-  rm_frame  zone_frame;
-  rm_cuts   cuts;
-  rm_tags   tags, moved;
-  rm_giants giants = {.num = 0};
+  rm_arena    *scratch = rm_arena_new();
+  rm_frame     zone_frame;
+  rm_tags      tags;
+  remap_status status;
 
-  RM_TRY(rm_part_frame(comm, frame, mesh, zone, &zone_frame));
-  RM_TRY(seat_evenly(scratch, comm, &zone_frame, mesh, zone, &cuts, &tags, reason));
+  RM_GOTO(done, status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = rm_part_frame(comm, frame, mesh, zone, &zone_frame));
   if (comm->size > 1) {
-    RM_TRY(balance(scratch, comm, mesh, &tags, &giants, &cuts, &moved, reason));
+    RM_GOTO(done, status = seat_evenly(scratch, comm, &zone_frame, mesh, zone, cuts, &tags, reason));
+    status = balance(arena, comm, mesh, &tags, giants, cuts, out, reason);
   } else {
-    RM_TRY(rm_part_no_giants(scratch, &giants));
-    moved = tags;
+    RM_GOTO(done, status = seat_evenly(arena, comm, &zone_frame, mesh, zone, cuts, out, reason));
+    status = rm_comm_agree(comm, rm_part_no_giants(arena, giants), NULL);
   }
-  return rm_part_match(arena, scratch, comm, &cuts, &moved, &giants, slicing, out);
+done:
+  rm_arena_drop(scratch);
+  return status;
 }
 
 remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *frame, const rm_mesh *const mesh[2],
@@ -71,11 +95,15 @@ remap_status rm_part_plan(rm_arena *arena, const rm_comm *comm, const rm_frame *
 {
   rm_arena    *scratch = rm_arena_new();
   rm_routes   *routes  = rm_arena_alloc(arena, 1, sizeof *routes);
+  rm_giants    giants;
+  rm_cuts      cuts;
+  rm_tags      tags;
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(comm, scratch && routes ? REMAP_OK : REMAP_NO_MEMORY, NULL));
   RM_ASSERT(scratch && routes);
-  RM_GOTO(done, status = plan(arena, scratch, comm, frame, mesh, zone, slicing, routes, reason));
+  RM_GOTO(done, status = seat(scratch, comm, frame, mesh, zone, &giants, &cuts, &tags, reason));
+  RM_GOTO(done, status = rm_part_match(arena, scratch, comm, &cuts, &tags, &giants, slicing, routes));
   *out = routes;
 done:
   rm_arena_drop(scratch);

@@ -56,9 +56,11 @@ static inline bool rm_part_makes_pair(const rm_part *part, rm_lid source, rm_lid
 
 /* How a rank's interval is cut into blocks. */
 typedef struct rm_slicing {
-  int64_t triangles; /* that the cells seated in a block have, about, at most; a face between two cells counts half     */
-  double  repeats;   /* triangles of sources that come to a rank once more, at most, over those of all cells seated
-                        there: fewer blocks are cut where there would be more                                           */
+  int64_t triangles; /* that the cells seated in a block have, about, at most; a face between two cells counts half   */
+  double  repeats;   /* triangles of sources that come to a block once more, at most, over those of all cells seated
+                        on the rank: fewer blocks are cut where there would be more                                   */
+  int64_t blocks;    /* that a rank has at least                                                                      */
+  int64_t few;       /* triangles: no smaller blocks are cut for that                                                 */
 } rm_slicing;
 extern const rm_slicing rm_one_block;
 

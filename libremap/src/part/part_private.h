@@ -129,11 +129,10 @@ remap_status rm_part_route_evenly(rm_arena *arena, const rm_comm *comm, const rm
  * way. */
 remap_status rm_part_cut_work(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, int64_t *const work[2], rm_cuts *out);
 
-/* Send the tags of this rank's cells of the zone to their seats. Collective. *out lives in arena, what is needed on the way in
- * scratch. TOO_LARGE if a rank gets more than it can number. */
-remap_status rm_part_send_tags(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
-                               const rm_mesh *const mesh[2], const rm_zone *zone, const rm_cuts *cuts, rm_tags *out,
-                               rm_reason *reason);
+/* Send the tags of this rank's cells of the zone to their seats. Collective. *out lives in arena. TOO_LARGE if a rank
+ * gets more than it can number. */
+remap_status rm_part_send_tags(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                               const rm_zone *zone, const rm_cuts *cuts, rm_tags *out, rm_reason *reason);
 /* The same for tags that lie in order over the ranks already, by other cuts. */
 remap_status rm_part_move_tags(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_cuts *cuts, rm_tags *out,
                                rm_reason *reason);

@@ -86,25 +86,37 @@ static remap_status sort(rm_arena *arena, rm_arena *scratch, int side, rm_tags *
   return REMAP_OK;
 }
 
-remap_status rm_part_send_tags(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
-                               const rm_mesh *const mesh[2], const rm_zone *zone, const rm_cuts *cuts, rm_tags *out,
-                               rm_reason *reason)
+/* The tags of one side. Collective. *tags lives in arena. */
+static remap_status send_side(rm_arena *arena, rm_arena *scratch, const rm_comm *comm, const rm_frame *zone_frame,
+                              const rm_mesh *mesh, const rm_zone *zone, const rm_cuts *cuts, rm_tags *tags, rm_reason *reason)
 {
-  rm_tags tags = {{0, 0}, {NULL, NULL}, {NULL, NULL}};
+  const int    side    = (int)mesh->side;
+  rm_route     route   = {0};
+  rm_tag      *tag     = NULL;
+  double     (*box)[6] = NULL;
+  remap_status mine    = rm_part_route_to_seats(scratch, comm, zone_frame, mesh, zone, cuts, &route);
 
-  for (int side = 0; side < 2; side++) {
-    rm_route     route   = {0};
-    rm_tag      *tag     = NULL;
-    double     (*box)[6] = NULL;
-    remap_status mine    = rm_part_route_to_seats(scratch, comm, zone_frame, mesh[side], zone, cuts, &route);
+  if (mine == REMAP_OK) mine = make_tags(scratch, comm, zone_frame, mesh, &route, &tag, &box);
+  RM_TRY(rm_comm_agree(comm, mine, NULL));
+  RM_TRY(exchange(scratch, comm, side, route.offset, tag, (const double(*)[6])box, tags, reason));
+  return rm_comm_agree(comm, sort(arena, scratch, side, tags), NULL);
+}
 
-    if (mine == REMAP_OK) mine = make_tags(scratch, comm, zone_frame, mesh[side], &route, &tag, &box);
-    RM_TRY(rm_comm_agree(comm, mine, NULL));
-    RM_TRY(exchange(scratch, comm, side, route.offset, tag, (const double(*)[6])box, &tags, reason));
-    RM_TRY(rm_comm_agree(comm, sort(arena, scratch, side, &tags), NULL));
+remap_status rm_part_send_tags(rm_arena *arena, const rm_comm *comm, const rm_frame *zone_frame, const rm_mesh *const mesh[2],
+                               const rm_zone *zone, const rm_cuts *cuts, rm_tags *out, rm_reason *reason)
+{
+  rm_tags      tags   = {{0, 0}, {NULL, NULL}, {NULL, NULL}};
+  remap_status status = REMAP_OK;
+
+  for (int side = 0; side < 2 && status == REMAP_OK; side++) {
+    rm_arena *scratch = rm_arena_new();
+
+    status = rm_comm_agree(comm, scratch ? REMAP_OK : REMAP_NO_MEMORY, NULL);
+    if (status == REMAP_OK) status = send_side(arena, scratch, comm, zone_frame, mesh[side], zone, cuts, &tags, reason);
+    rm_arena_drop(scratch);
   }
   *out = tags;
-  return REMAP_OK;
+  return status;
 }
 
 remap_status rm_part_move_tags(rm_arena *arena, const rm_comm *comm, const rm_tags *tags, const rm_cuts *cuts, rm_tags *out,
