@@ -192,7 +192,8 @@ static void exhaust(work what)
 
   /* 6: large enough for arrays with blocks of their own */
   open_world(&w, what == BUILD ? 6 : what == MOVE ? 4 : what == SYSTEMS ? 3 : 2, what);
-  w.ctx->slicing = (rm_slicing){.triangles = 4000 / rt_size(), .repeats = INFINITY}; /* the build of the largest has two blocks or three */
+  /* the build of the largest has two blocks or three */
+  w.ctx->slicing = (rm_slicing){.triangles = 4000 / rt_size(), .repeats = INFINITY};
   for (int n = 0; comes && n < 2000; n++) {
     remap_status status;
 

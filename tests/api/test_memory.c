@@ -60,7 +60,7 @@ static amounts build(int n, remap_faces faces, int64_t triangles)
   for (int side = 0; side < 2; side++)
     mesh[side] = tm_hexahedra((int[]){n + side, n + side, n + side}, tm_warp, &(tm_warping){.03, side ? .1 : .7});
   RT_EQ(remap_create(MPI_COMM_WORLD, &options, &ctx), REMAP_OK);
-  ctx->slicing.triangles = triangles;
+  ctx->slicing = (rm_slicing){.triangles = triangles, .repeats = RM_BLOCK_REPEATS};
   for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, side, &mesh[side]->view), REMAP_OK);
   before = most = held;
   RT_EQ(remap_build(ctx), REMAP_OK);

@@ -34,7 +34,7 @@ typedef struct rm_place {
  * faces, 21 MB with centres; and how many triangles may come twice for that. Less on small
  * ranks, for what they take to fall with their number. Pairs that go home at once, at least: of 200 bytes
  * while they do. */
-enum { RM_BLOCK_TRIANGLES = 80000, RM_BLOCKS = 20, RM_BLOCK_FEW = 30000, RM_SLICE_PAIRS = 20000 };
+enum { RM_BLOCK_TRIANGLES = 80000, RM_BLOCKS = 28, RM_BLOCK_FEW = 25000, RM_SLICE_PAIRS = 20000 };
 #define RM_BLOCK_REPEATS 0.5
 
 /* Calls that all ranks make together, or among neighbours. */

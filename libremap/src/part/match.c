@@ -298,7 +298,7 @@ static remap_status choose_blocks(here *h, const rm_slicing *slicing)
 /* The wants of one side, block after block. */
 typedef struct wants {
   int64_t  *offset; /* [blocks + 1]                                                          */
-  rm_lid   *cell;   /* [offset[blocks]] number at its home, of other homes' cells among those that come here in the end */
+  rm_lid   *cell;   /* [offset[blocks]] number at its home; of other homes' cells, in the end, among those that come here */
   uint8_t  *role;   /* [offset[blocks]]                                                      */
   rm_keyed *spare;  /* [most of one block] */
   rm_keyed *away;   /* [num_away] those of other homes: key as in a list, item the place     */
