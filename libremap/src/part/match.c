@@ -273,8 +273,8 @@ static void drop_blocks(here *h)
   h->once = h->often = 0;
 }
 
-/* Cut into as few blocks as are asked for and have no more triangles each than that, about; into fewer where too many sources would come
- * more than once, for what meets many blocks is triangulated with each of them. Not collective. */
+/* Cut into as few blocks as are asked for and have no more triangles each than that, about; into fewer where too many sources
+ * would come more than once, for what meets many blocks is triangulated with each of them. Not collective. */
 static remap_status choose_blocks(here *h, const rm_slicing *slicing)
 {
   int64_t all = 0, num;
