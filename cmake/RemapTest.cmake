@@ -62,6 +62,11 @@ function(remap_test room thing)
   remap_mpi_test(${room} ${thing} ${exe} RANKS ${T_RANKS} TIMEOUT ${T_TIMEOUT})
 endfunction()
 
+# remap_heap(<target>): a program of which one file includes heap.h.
+function(remap_heap exe)
+  target_link_options(${exe} PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wrap=free)
+endfunction()
+
 # remap_bench(<thing> [HEAP] [LIBS <targets>]): tests/bench/bench_<thing>.c as the program bench_<thing>, which CTest does not
 # run. HEAP: it counts the memory that it and the library hold.
 function(remap_bench thing)
@@ -70,7 +75,7 @@ function(remap_bench thing)
   remap_test_program(bench_${thing} bench/bench_${thing}.c ${T_LIBS})
   if(T_HEAP)
     target_compile_definitions(bench_${thing} PRIVATE BENCH_HEAP)
-    target_link_options(bench_${thing} PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wrap=free)
+    remap_heap(bench_${thing})
   endif()
 endfunction()
 

@@ -1,26 +1,9 @@
 /* One rank fails, at every place where it can: memory that runs out at its n-th request, a callback that cancels, data that are
  * wrong. Every rank returns the same status, none waits for another for ever, and the context is good for another try. */
 #include "api/context.h"
+#include "heap.h"
 #include "meshes.h"
 #include "rt.h"
-
-/* ---- memory: the library's requests come here by the linker's --wrap ----------------------------------------------------- */
-
-static long left = -1; /* requests until one fails, -1: none does */
-static bool is_out(void) { return left >= 0 && left-- == 0; }
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size) { return is_out() ? NULL : __real_malloc(size); }
-void *__wrap_calloc(size_t n, size_t size) { return is_out() ? NULL : __real_calloc(n, size); }
-void *__wrap_realloc(void *old, size_t size) { return is_out() ? NULL : __real_realloc(old, size); }
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { return is_out() ? NULL : __real_aligned_alloc(alignment, size); }
 
 static bool is_last(void) { return rt_rank() == rt_size() - 1; }
 
@@ -151,12 +134,12 @@ static remap_status make_supermesh(world *w)
   options.pass_through = 1;
   status               = remap_supermesh(w->ctx, &options, &view);
   if (status == REMAP_OK) {
-    const long requests = left;
+    const int64_t requests = heap.left;
 
-    left             = -1; /* for what is the test's own */
+    heap.left             = -1; /* for what is the test's own */
     double  *values = tm_alloc_(view.num_cells, sizeof *values);
     int32_t *faces = tm_alloc_(view.num_faces, sizeof *faces), *in = tm_alloc_(w->mine[0]->view.num_faces, sizeof *in);
-    left        = requests;
+    heap.left        = requests;
 
     status = remap_supermesh_cell_values(w->ctx, REMAP_TARGET, w->u[1], 0.0, values);
     if (status == REMAP_OK) status = remap_supermesh_face_values(w->ctx, REMAP_SOURCE, in, -1, faces);
@@ -198,10 +181,10 @@ static void exhaust(work what)
     remap_status status;
 
     if (what == MOVE) prepare_move(&w);
-    left   = is_last() ? n : -1;
+    heap.left   = is_last() ? n : -1;
     status = run(&w, what);
-    comes  = !rt_all(!is_last() || left >= 0);
-    left   = -1;
+    comes  = !rt_all(!is_last() || heap.left >= 0);
+    heap.left   = -1;
     if (!is_agreed(status)) break;
     RT_CHECK(status == REMAP_OK || status == REMAP_NO_MEMORY);
     RT_CHECK(status == REMAP_OK || remap_message(w.ctx)[0] != '\0');
@@ -282,9 +265,9 @@ static void an_option_of_one_rank_fails_on_all(void)
   remap_status status = REMAP_NO_MEMORY;
   int          failed = 0;
   for (int n = 0; n < 100 && status == REMAP_NO_MEMORY; n++) { /* memory for a context, on one rank */
-    left   = is_last() ? n : -1;
+    heap.left   = is_last() ? n : -1;
     status = remap_create(MPI_COMM_WORLD, NULL, &ctx);
-    left   = -1;
+    heap.left   = -1;
     if (!is_agreed(status)) break;
     failed += status == REMAP_NO_MEMORY && !ctx;
     remap_destroy(&ctx);
@@ -304,9 +287,9 @@ static void pairs_without_memory_are_refused_with_a_message_and_handed_out_later
   RT_EQ(remap_build(w.ctx), REMAP_OK);
   for (int d = 0; d < 2; d++, status = REMAP_NO_MEMORY) {
     for (int n = 0; status == REMAP_NO_MEMORY && n < 100; n++) { /* not collective: every rank runs out by itself */
-      left   = n;
+      heap.left   = n;
       status = remap_pairs(w.ctx, d, &pairs);
-      left   = -1;
+      heap.left   = -1;
       failed += status == REMAP_NO_MEMORY;
       RT_CHECK((status == REMAP_NO_MEMORY) == (strstr(remap_message(w.ctx), "remap_pairs: no memory") != NULL));
     }

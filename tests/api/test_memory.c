@@ -1,46 +1,8 @@
-/* What remap_build holds at most, and afterwards, per cell and per pair: the library's memory is counted by the linker's
- * --wrap. */
+/* What remap_build holds at most, and afterwards, per cell and per pair: what the library holds is counted (heap.h). */
 #include "api/context.h"
+#include "heap.h"
 #include "meshes.h"
 #include "rt.h"
-
-#include <malloc.h>
-
-static size_t held, most;
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void  __real_free(void *memory);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void  __wrap_free(void *memory);
-
-static void *taken(void *memory)
-{
-  held += malloc_usable_size(memory);
-  most = held > most ? held : most;
-  return memory;
-}
-void *__wrap_malloc(size_t size) { return taken(__real_malloc(size)); }
-void *__wrap_calloc(size_t n, size_t size) { return taken(__real_calloc(n, size)); }
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { return taken(__real_aligned_alloc(alignment, size)); }
-void *__wrap_realloc(void *old, size_t size)
-{
-  const size_t before = malloc_usable_size(old);
-  void        *memory = __real_realloc(old, size);
-
-  if (memory) held -= before;
-  return memory ? taken(memory) : NULL;
-}
-void __wrap_free(void *memory)
-{
-  held -= malloc_usable_size(memory);
-  __real_free(memory);
-}
 
 /* Bytes per target cell at the peak of a build of two warped grids of about n^3 cells, and after it; pairs per target cell. */
 typedef struct amounts {
@@ -53,7 +15,7 @@ static amounts build(int n, remap_faces faces, int64_t triangles)
   remap_options  options;
   remap_context *ctx = NULL;
   remap_stats    stats;
-  size_t         before;
+  int64_t        before;
 
   remap_options_default(&options);
   options.faces = faces;
@@ -62,9 +24,10 @@ static amounts build(int n, remap_faces faces, int64_t triangles)
   RT_EQ(remap_create(MPI_COMM_WORLD, &options, &ctx), REMAP_OK);
   ctx->slicing = (rm_slicing){.triangles = triangles, .repeats = RM_BLOCK_REPEATS};
   for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, side, &mesh[side]->view), REMAP_OK);
-  before = most = held;
+  before = heap.most = heap.held;
   RT_EQ(remap_build(ctx), REMAP_OK);
-  const double cells = (double)mesh[1]->view.num_cells, peak = (double)(most - before), kept = (double)(held - before);
+  const double cells = (double)mesh[1]->view.num_cells;
+  const double peak = (double)(heap.most - before), kept = (double)(heap.held - before);
   RT_EQ(remap_get_stats(ctx, &stats), REMAP_OK);
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mesh[side]);

@@ -2,43 +2,9 @@
  * one mesh or both, by coordinates or by a matrix, for steps so small that much is kept and for jumps; what it refuses; and
  * that memory does not grow. */
 #include <remap/remap.h>
-#include <malloc.h>
+#include "heap.h"
 #include "meshes.h"
 #include "rt.h"
-
-/* ---- memory that the library holds: counted by the linker's --wrap ---------------------------------------------- */
-
-static int64_t held;
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void  __real_free(void *block);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void  __wrap_free(void *block);
-static void *counted(void *block)
-{
-  held += block ? (int64_t)malloc_usable_size(block) : 0;
-  return block;
-}
-void *__wrap_malloc(size_t size) { return counted(__real_malloc(size)); }
-void *__wrap_calloc(size_t n, size_t size) { return counted(__real_calloc(n, size)); }
-void *__wrap_realloc(void *old, size_t size)
-{
-  held -= old ? (int64_t)malloc_usable_size(old) : 0;
-  return counted(__real_realloc(old, size));
-}
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { return counted(__real_aligned_alloc(alignment, size)); }
-void  __wrap_free(void *block)
-{
-  held -= block ? (int64_t)malloc_usable_size(block) : 0;
-  __real_free(block);
-}
-
-/* ------------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct world {
   remap_context *ctx;
@@ -289,7 +255,7 @@ static void a_thousand_moves_hold_no_more_memory_than_sixty(void)
 #else
   const int num = rt_size() == 1 ? 1000 : 80;
 #endif
-  const int64_t share = rt_size() == 1 ? 1024 : 16; /* MPI's own store, of messages that came early too, counts in `held` */
+  const int64_t share = rt_size() == 1 ? 1024 : 16; /* MPI's own store, of messages that came early too, counts in heap.held */
   int64_t       most = 0;
   int           grown = 0;
   world         w;
@@ -304,8 +270,8 @@ static void a_thousand_moves_hold_no_more_memory_than_sixty(void)
 
     RT_EQ(remap_move(w.ctx, motion), REMAP_OK);
     if (step % 10 == 0) RT_EQ(remap_field(w.ctx, REMAP_FORWARD, NULL, 1, &f, NULL), REMAP_OK);
-    if (step < 60) most = held > most ? held : most; /* three times to and fro */
-    else if (held - most > most / share) grown++;
+    if (step < 60) most = heap.held > most ? heap.held : most; /* three times to and fro */
+    else if (heap.held - most > most / share) grown++;
   }
   RT_EQ(grown, 0);
   free(u), free(v);

@@ -1,24 +1,9 @@
 /* What a solver with moving bodies asks of transfers: halves that overlap with its own work, no memory and no collective after
  * the first call, borrowed arrays of any layout, blocks, masks, several contexts. */
 #include <remap/remap.h>
+#include "heap.h"
 #include "meshes.h"
 #include "rt.h"
-
-/* ---- memory that the library takes: counted by the linker's --wrap ------------------------------------------------------- */
-
-static long taken;
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size) { return taken++, __real_malloc(size); }
-void *__wrap_calloc(size_t n, size_t size) { return taken++, __real_calloc(n, size); }
-void *__wrap_realloc(void *old, size_t size) { return taken++, __real_realloc(old, size); }
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { return taken++, __real_aligned_alloc(alignment, size); }
 
 /* ---- calls of MPI that it makes: counted by MPI's profiling interface -------------------------------------------- */
 
@@ -202,14 +187,14 @@ static void transfers_after_the_first_take_no_memory(void)
     double              *v = tm_alloc_(2 * w.cells[1], sizeof *v);
     const remap_transfer how = nearest();
     remap_field_desc     f[2];
-    long                 before;
+    int64_t              before;
 
     for (int k = 0; k < 2; k++)
       f[k] = (remap_field_desc){.nature = REMAP_CONSERVED, .in = w.u[0], .out = v + k, .out_stride = 2};
     RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 2, f, NULL), REMAP_OK);
-    before = taken;
+    before = heap.requests;
     for (int n = 0; n < 5; n++) RT_EQ(remap_field(w.ctx, REMAP_FORWARD, &how, 1 + n % 2, f, NULL), REMAP_OK);
-    RT_EQ(taken - before, 0);
+    RT_EQ(heap.requests - before, 0);
     free(v);
   }
   close_world(&w);

@@ -17,7 +17,6 @@
 #ifndef BENCH_H
 #define BENCH_H
 
-#include <malloc.h>
 #include <sys/resource.h>
 #include <time.h>
 #include "meshes.h"
@@ -63,53 +62,19 @@ static inline double bench_rss_bytes(void)
 
 /* ---- memory in use ------------------------------------------------------------------------------------------------ */
 
-/* Programs built by remap_bench(... HEAP) count what they and the static library hold; one thread. */
+/* Programs built by remap_bench(... HEAP) count what they and the static library hold. */
 #ifdef BENCH_HEAP
-static size_t bench_heap_now_, bench_heap_peak_;
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void  __real_free(void *memory);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-void  __wrap_free(void *memory);
-
-static inline void *bench_taken_(void *memory)
-{
-  bench_heap_now_ += malloc_usable_size(memory);
-  if (bench_heap_now_ > bench_heap_peak_) bench_heap_peak_ = bench_heap_now_;
-  return memory;
-}
-void *__wrap_malloc(size_t size) { return bench_taken_(__real_malloc(size)); }
-void *__wrap_calloc(size_t n, size_t size) { return bench_taken_(__real_calloc(n, size)); }
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { return bench_taken_(__real_aligned_alloc(alignment, size)); }
-void *__wrap_realloc(void *old, size_t size)
-{
-  const size_t before = malloc_usable_size(old);
-  void        *memory = __real_realloc(old, size);
-
-  if (memory) bench_heap_now_ -= before;
-  return memory ? bench_taken_(memory) : NULL;
-}
-void __wrap_free(void *memory)
-{
-  bench_heap_now_ -= malloc_usable_size(memory);
-  __real_free(memory);
-}
+#include "heap.h"
 
 /* Bytes held now, from where the peak is counted anew. */
 static inline double bench_heap_start(void)
 {
-  bench_heap_peak_ = bench_heap_now_;
-  return (double)bench_heap_now_;
+  heap.most = heap.held;
+  return (double)heap.held;
 }
 /* Bytes held now, and the most since bench_heap_start. */
-static inline double bench_heap_now(void) { return (double)bench_heap_now_; }
-static inline double bench_heap_peak(void) { return (double)bench_heap_peak_; }
+static inline double bench_heap_now(void) { return (double)heap.held; }
+static inline double bench_heap_peak(void) { return (double)heap.most; }
 #endif
 
 /* ---- meshes ------------------------------------------------------------------------------------------------------- */

@@ -17,24 +17,24 @@ static remap_status one_field(remap_context *ctx, const double *u, double *v)
 }
 
 /* Heap held at the peak of remap_build and after it, and when fields have been moved. */
-typedef struct heap {
+typedef struct amounts {
   double peak, built, moved;
-} heap;
+} amounts;
 
 /* Build once, and transfer a field twice: the first time prepares the stencils. */
 static remap_status measure(remap_context *ctx, const double *u, double *v, int r, const times *t, remap_stats *stats,
-                            heap *bytes)
+                            amounts *bytes)
 {
   remap_status status;
 
   MPI_Barrier(MPI_COMM_WORLD);
   const double start = MPI_Wtime(), cpu = bench_cpu();
-  status             = remap_build(ctx);
+  status = remap_build(ctx);
   if (status != REMAP_OK) return status;
   bytes->peak  = bench_heap_peak();
   bytes->built = bench_heap_now();
   t->build[r]  = MPI_Wtime() - start;
-  t->cpu[r]   = bench_cpu() - cpu;
+  t->cpu[r]    = bench_cpu() - cpu;
   remap_get_stats(ctx, stats);
   t->partition[r] = stats->seconds_partition;
   t->overlay[r]   = stats->seconds_overlay;
@@ -55,14 +55,14 @@ static double largest(double x)
 
 int main(int argc, char **argv)
 {
-  const int     repeats = argc > 4 ? atoi(argv[4]) : 1, faces = argc > 3 ? bench_faces(argv[3]) : -1;
-  int           rank, size;
-  tm_mesh      *whole[2], *mine[2];
-  int64_t       cells[2];
-  remap_options options;
-  remap_context *ctx = NULL;
-  remap_stats   stats = {0};
-  remap_status  status;
+  const int      repeats = argc > 4 ? atoi(argv[4]) : 1, faces = argc > 3 ? bench_faces(argv[3]) : -1;
+  int            rank, size;
+  tm_mesh       *whole[2], *mine[2];
+  int64_t        cells[2];
+  remap_options  options;
+  remap_context *ctx   = NULL;
+  remap_stats    stats = {0};
+  remap_status   status;
 
   MPI_Init(&argc, &argv);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
@@ -84,14 +84,14 @@ int main(int argc, char **argv)
   options.faces = (remap_faces)faces;
   status        = remap_create(MPI_COMM_WORLD, &options, &ctx);
   for (int side = 0; side < 2 && status == REMAP_OK; side++) status = remap_set_mesh(ctx, side, &mine[side]->view);
-  const double held = bench_heap_start();
-  heap         bytes = {0, 0, 0}, once = {0, 0, 0};
+  const double held  = bench_heap_start();
+  amounts      bytes = {0, 0, 0}, once = {0, 0, 0};
   for (int r = 0; r < repeats && status == REMAP_OK; r++) {
     status = measure(ctx, u, v, r, &t, &stats, &once);
-    if (r == 0) bytes = (heap){once.peak - held, once.built - held, once.moved - held};
+    if (r == 0) bytes = (amounts){once.peak - held, once.built - held, once.moved - held};
   }
   if (status != REMAP_OK && rank == 0) fprintf(stderr, "%s: %s\n", remap_status_text(status), remap_message(ctx));
-  bytes = (heap){largest(bytes.peak) * size, largest(bytes.built) * size, largest(bytes.moved) * size};
+  bytes = (amounts){largest(bytes.peak) * size, largest(bytes.built) * size, largest(bytes.moved) * size};
   if (status == REMAP_OK && rank == 0)
     printf("{\"bench\":\"build\",\"case\":\"%s\",\"n\":%s,\"ranks\":%d,\"faces\":\"%s\",\"cells\":[%lld,%lld],\"pairs\":%lld,"
            "\"closure\":[%.1e,%.1e],"

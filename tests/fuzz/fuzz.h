@@ -40,6 +40,7 @@
 #include <sanitizer/lsan_interface.h>
 #endif
 
+/* What a fuzz program tries: one input. It ends the program, by FUZZ_CHECK, if a property fails. */
 void fuzz_one(const uint8_t *data, size_t size);
 
 /* Inputs that got past the checks of what they are given to, for the last line. */

@@ -3,23 +3,9 @@
 #include "files.h"
 
 #include "../slices/blocks.h"
+#include "heap.h"
 
 #include <glob.h>
-
-/* ---- memory: the requests of this program come here by the linker's --wrap ----------------------------------------------- */
-
-static long left = -1; /* requests until one fails, -1: none does */
-static bool is_out(void) { return left >= 0 && left-- == 0; }
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t n, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_malloc(size_t size) { return is_out() ? NULL : __real_malloc(size); }
-void *__wrap_calloc(size_t n, size_t size) { return is_out() ? NULL : __real_calloc(n, size); }
-void *__wrap_realloc(void *old, size_t size) { return is_out() ? NULL : __real_realloc(old, size); }
 
 /* ---- files ------------------------------------------------------------------------------------------------------------- */
 
@@ -125,11 +111,11 @@ static void exhaust(rcgns_status (*work)(world *w))
   RT_EQ(rcgns_write_supermesh(MPI_COMM_WORLD, w.poly, 4.2, &w.blocks->content, &why), RCGNS_OK);
   for (int n = 0; comes && n < 5000; n += rt_size()) {
     why.text[0] = '\0';
-    left        = rt_rank() == rt_size() - 1 ? n : -1;
+    heap.left        = rt_rank() == rt_size() - 1 ? n : -1;
     const rcgns_status status = work(&w);
 
-    comes = !rt_all(rt_rank() < rt_size() - 1 || left >= 0);
-    left  = -1;
+    comes = !rt_all(rt_rank() < rt_size() - 1 || heap.left >= 0);
+    heap.left  = -1;
     RT_CHECK(status == RCGNS_MEMORY || (status == RCGNS_OK && !comes));
     int same[2] = {(int)status, -(int)status};
     MPI_Allreduce(MPI_IN_PLACE, same, 2, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
