@@ -74,9 +74,9 @@ static double moving_takes(int n, int num_fields)
   RT_EQ(remap_create(MPI_COMM_WORLD, NULL, &ctx), REMAP_OK);
   for (int side = 0; side < 2; side++) RT_EQ(remap_set_mesh(ctx, side, &mesh[side]->view), REMAP_OK);
   RT_EQ(remap_build(ctx), REMAP_OK);
-  const size_t before = held;
+  const int64_t before = heap.held;
   RT_EQ(remap_field(ctx, REMAP_FORWARD, NULL, num_fields, field, NULL), REMAP_OK);
-  const double bytes = (double)(held - before) / (double)mesh[1]->view.num_cells;
+  const double bytes = (double)(heap.held - before) / (double)mesh[1]->view.num_cells;
   remap_destroy(&ctx);
   for (int side = 0; side < 2; side++) tm_free(mesh[side]), free(value[side]);
   return bytes;
