@@ -1,7 +1,8 @@
 /* number -- equal keys of all ranks get one number, in the order of the keys: each rank has its own in order, every key goes to
  * the rank of its interval, is numbered there, and the number comes back. Where first words are numbers from 0 on, counts of
- * them tell where to cut, the same number of counts on any number of ranks; elsewhere samples of the keys. Words are sorted one
- * after the other, and a later one only where the earlier ones are equal. O(n) mostly; 32 bytes and the key for each. */
+ * them tell where to cut, the same number of counts on any number of ranks; elsewhere samples of the keys. What the ranks sent
+ * is merged. Keys without order are sorted a word after the other, by a later one only where the earlier ones are equal.
+ * O(n log ranks); 16 bytes and the key for each. */
 #include "super/super_private.h"
 
 #include <string.h>
@@ -185,14 +186,55 @@ static remap_status cut_by_samples(rm_arena *passing, dealing *d)
   return REMAP_OK;
 }
 
+/* Keys that arrived, a run in order from every rank; a heap has the ranks whose runs go on, the one of the least key first. */
+typedef struct merge {
+  const dealing *d;
+  int64_t       *next; /* [ranks] place of the run's next key */
+  int           *heap;
+  int            num;
+} merge;
+
+static bool comes_first(const merge *m, int a, int b)
+{
+  const dealing *d = m->d;
+  return compare(d->arrived + m->next[a] * d->words, d->arrived + m->next[b] * d->words, d->words) < 0;
+}
+
+static void sift_down(merge *m, int k)
+{
+  for (int best;; k = best) {
+    best = k;
+    for (int child = 2 * k + 1; child <= 2 * k + 2 && child < m->num; child++)
+      if (comes_first(m, m->heap[child], m->heap[best])) best = child;
+    if (best == k) return;
+    const int x   = m->heap[k];
+    m->heap[k]    = m->heap[best];
+    m->heap[best] = x;
+  }
+}
+
 static remap_status number_here(rm_arena *passing, dealing *d, int64_t *num)
 {
-  const int64_t n = d->recv_offset[d->comm->size];
-  keys          k;
+  const uint64_t *last = NULL;
+  merge           m    = {.d = d};
 
-  RM_TRY(start(passing, n, d->words, d->arrived, &k));
-  RM_NEW(d->answer, passing, n);
-  *num = rank_keys(&k, n, d->answer);
+  RM_NEW(d->answer, passing, d->recv_offset[d->comm->size]);
+  RM_NEW(m.next, passing, d->comm->size);
+  RM_NEW(m.heap, passing, d->comm->size);
+  for (int r = 0; r < d->comm->size; r++) {
+    m.next[r] = d->recv_offset[r];
+    if (m.next[r] < d->recv_offset[r + 1]) m.heap[m.num++] = r;
+  }
+  for (int k = m.num / 2; k-- > 0;) sift_down(&m, k);
+  for (*num = 0; m.num; sift_down(&m, 0)) {
+    const int       r   = m.heap[0];
+    const uint64_t *key = d->arrived + m.next[r] * d->words;
+
+    *num += !last || compare(last, key, d->words) != 0;
+    d->answer[m.next[r]++] = *num - 1;
+    last                   = key;
+    if (m.next[r] == d->recv_offset[r + 1]) m.heap[0] = m.heap[--m.num];
+  }
   return REMAP_OK;
 }
 

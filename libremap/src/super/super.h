@@ -5,8 +5,8 @@
  * the supermesh of the core: it is complete there, down to the vertices on its faces. Vertices are known by what they are
  * made of and not by their rounded place, faces by their vertices, so what two ranks made is recognised exactly, and
  * numbered in one order. Zones of one mesh that touch without matching faces are joined first, in the same way. O(n log n)
- * time; some 850 bytes (centre, 580 diagonal) for each cell of the result while cells are made, on several ranks 1500 while they
- * are numbered. */
+ * time; some 850 bytes (centre, 580 diagonal) for each cell of the result while cells are made, on several ranks 1300 while
+ * they are numbered. */
 #ifndef RM_SUPER_H
 #define RM_SUPER_H
 
