@@ -4,6 +4,8 @@
  * unless bounds travel. */
 #include "field_private.h"
 
+#include <string.h>
+
 void rm_word_add(rm_word *word, remap_status status)
 {
   if (status > word->mine) word->mine = status;
@@ -101,13 +103,24 @@ bool rm_profile_reads_halo(const rm_packing *packing)
   return reads;
 }
 
+/* Values as they are, where nothing else travels: to the pack of a profile whose cells have places there. */
+static void copy_values(const rm_profile *p, int num)
+{
+  for (rm_lid c = 0; c < p->ground.mesh->num_cells && num == 1; c++) p->pack[p->place[c]] = p->given[c];
+  for (rm_lid c = 0; c < p->ground.mesh->num_cells && num > 1; c++)
+    memcpy(p->pack + (int64_t)p->place[c] * num, p->given + (int64_t)c * num, (size_t)num * sizeof *p->pack);
+}
+
 void rm_profile_post(rm_profile *p, const rm_comm *comm, const rm_packing *packing, rm_word *word)
 {
-  const size_t bytes = (size_t)packing->num_fields * sizeof(double);
+  const size_t bytes   = (size_t)packing->num_fields * sizeof(double);
+  const bool   is_bare = packing->width == packing->num_fields && packing->num_systems == 0 && !p->ground.measure;
 
   for (int f = 0; f < 2 * packing->num_fields; f++) p->limited[f] = 0;
   if (rm_profile_reads_halo(packing)) {
     rm_word_post(word, comm, &p->halo, bytes, p->number);
+  } else if (word->note.status == REMAP_OK && is_bare) {
+    copy_values(p, packing->num_fields);
   } else if (word->note.status == REMAP_OK) {
     rm_reconstruct(p, packing, 0, RM_FINISH);
     rm_reconstruct(p, packing, 1, RM_FINISH);

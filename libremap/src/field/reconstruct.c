@@ -449,19 +449,16 @@ static void clear_slopes(const rm_packing *p, double *place)
   }
 }
 
-static void finish_cell(const rm_profile *w, const rm_packing *p, rm_lid cell, bool asked)
+static void finish_cell(const rm_profile *w, const rm_packing *p, rm_lid cell, bool asked, bool is_sloped)
 {
   const int     num   = p->num_fields;
   const double *given = w->given + (int64_t)cell * num, *number = w->number + (int64_t)cell * num;
   const bool    is_same = asked && rm_is_copied(w->ground.rows, w->ground.differs, cell, true);
   double       *place   = rm_pack_of(w, p, cell);
 
-  if (p->width == num && p->num_systems == 0)
-    memcpy(place, given, (size_t)num * sizeof *place);
-  else
-    for (int f = 0; f < num; f++)
-      place[p->at[f]] = is_same || p->system_of[f] < 0 ? given[f] : rm_system_amount(p, f, given, number);
-  if (asked && rm_profile_reads_halo(p))
+  for (int f = 0; f < num; f++)
+    place[p->at[f]] = is_same || p->system_of[f] < 0 ? given[f] : rm_system_amount(p, f, given, number);
+  if (asked && is_sloped)
     finish_slopes(w, p, cell, place);
   else if (p->width > num)
     clear_slopes(p, place);
@@ -477,6 +474,6 @@ void rm_reconstruct(const rm_profile *w, const rm_packing *p, uint8_t which, int
 
     if (w->needs_halo[c] != which) continue;
     if (steps & RM_FIT && is_sloped && (asked || p->is_checked)) fit_cell(w, p, c, asked);
-    if (steps & RM_FINISH) finish_cell(w, p, c, asked);
+    if (steps & RM_FINISH) finish_cell(w, p, c, asked, is_sloped);
   }
 }

@@ -81,6 +81,35 @@ RM_UNROLLED unsigned rough_fields(const rm_profile *w, const rm_packing *p, cons
   return rough;
 }
 
+/* The same of a span of one field, slopes along x and y side by side. */
+static unsigned rough_field(const rm_profile *w, const rm_packing *p, const rm_span *span, rm_lid cell)
+{
+  const rm_stencil *stencil = w->ground.stencil;
+  const rm_mesh    *mesh    = w->ground.mesh;
+  const rm_lid      cells   = stencil->num_cells;
+  const int64_t     stride  = 4 * (int64_t)p->num_fields;
+  const uint32_t   *own     = w->shown + 4 * span->first;
+  const uint32_t   *halo    = (const uint32_t *)(const void *)w->slopes.received + 4 * span->first;
+  const rm_around   u       = rm_around_span(w, p, span);
+  const double     *c = mesh->cell_centroid[cell], value = rm_value_at(&u, cells, cell);
+  const rm_lanes    xy = rm_lanes_from_halves(own + cell * stride), zr = rm_lanes_from_halves(own + cell * stride + 2);
+  double            most = 0.0, widest = 0.0;
+
+  for (int64_t k = stencil->offset[cell], end = stencil->offset[cell + 1]; k < end; k++) {
+    const rm_lid    n        = stencil->neighbour[k];
+    const double   *x        = n < cells ? mesh->cell_centroid[n] : stencil->halo_centroid[n - cells];
+    const uint32_t *other    = n < cells ? own + n * stride : halo + (n - cells) * stride;
+    const rm_lanes  other_zr = rm_lanes_from_halves(other + 2);
+    const rm_lanes  told     = (xy + rm_lanes_from_halves(other)) * ((rm_lanes_at(x) - rm_lanes_at(c)) * rm_lanes_of(0.5));
+    const double    rest     = (zr[0] + other_zr[0]) * (0.5 * (x[2] - c[2]));
+    const double    wrong    = fabs(rm_value_at(&u, cells, n) - value - (told[0] + told[1] + rest));
+
+    most   = wrong > most ? wrong : most;
+    widest = other_zr[1] > widest ? other_zr[1] : widest;
+  }
+  return most > ROUGH * widest;
+}
+
 /* Set bits first to first + num - 1. */
 static void set_bits(uint64_t *words, int first, int num, unsigned bits)
 {
@@ -98,8 +127,9 @@ void rm_smooth_roughness(const rm_profile *w, const rm_packing *p, uint64_t *rou
       const rm_span *span = &p->span[i];
 
       if (p->order[span->first] < 2) continue;
-      const unsigned bits =
-          span->num > 2 ? rough_fields(w, p, span, c, span->num, TWOS) : rough_fields(w, p, span, c, span->num, 1);
+      const unsigned bits = span->num > 2   ? rough_fields(w, p, span, c, span->num, TWOS)
+                            : span->num > 1 ? rough_fields(w, p, span, c, span->num, 1)
+                                            : rough_field(w, p, span, c);
 
       if (bits) set_bits(rough + (int64_t)c * words, span->first, span->num, bits);
     }
