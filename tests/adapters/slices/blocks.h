@@ -5,8 +5,8 @@
  *   bl_free(b);
  *
  * Ancestors: cell c lies in source cell c, and in target cell c / 2 if c is even. Every face lies in one of the source, every
- * third in one of the target: face g of cell g + 1, called 100 + g, and of cell g / 2 + 1, called g % 6 + 1. A field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the
- * program. */
+ * third in one of the target: face g in one of cell g + 1 called 100 + g, and in one of cell g / 2 + 1 called g % 6 + 1. A
+ * field "Number" holds 1.5 c, six boundaries are the sides. Memory that runs out ends the program. */
 #ifndef BLOCKS_H
 #define BLOCKS_H
 
