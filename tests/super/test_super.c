@@ -573,6 +573,28 @@ static void zones_that_overlap_by_more_are_refused_by_name(void)
   close_world(&w);
 }
 
+static tm_mesh *without_zones(int side, uint64_t seed)
+{
+  tm_mesh *m = patched(side, seed);
+
+  m->view.num_zones = 0;
+  return m;
+}
+
+static void parts_of_a_zone_that_do_not_match_are_refused_by_name(void)
+{
+  for (uint64_t seed = 1; seed <= 2; seed++) {
+    const plan  p  = {without_zones, seed, REMAP_FACES_CENTRE, {UNION, 0, 0, 1}, false, true};
+    const char *by = "cell 1: a face of this cell meets one of the cell with global number 24, but they do not match";
+    world       w;
+
+    open_world(&w, MPI_COMM_WORLD, &p);
+    RT_EQ(w.status, REMAP_BAD_MESH);
+    if (!RT_CHECK(strstr(remap_message(w.ctx), seed == 1 ? by : "do not match"))) printf("# %s\n", remap_message(w.ctx));
+    close_world(&w);
+  }
+}
+
 /* ---- cells without thickness ------------------------------------------------------------------------------------- */
 
 static void to_two(double xyz[3], const void *data)
@@ -674,9 +696,9 @@ static void every_refusal_names_a_cell(void)
   static const struct {
     const char *mesh, *text;
   } say[] = {{"source mesh: ", "this cell overlaps another of its mesh"},
-             {"target mesh: ", "a face of this cell meets cells of the other mesh that overlap"},
+             {"source mesh: ", "a face of this cell meets one of the cell with global number 8, but"},
              {"t mesh: cell ", "a face of this cell meets cells of the other mesh that overlap"},
-             {"source mesh: ", "the faces around an edge of this cell do not bound cells"},
+             {"source mesh: ", "a face of this cell meets one of the cell with global number 1, but"},
              {"source mesh: cell ", "a part of this cell is inverted"},
              {"source mesh: ", "a part of this cell lies on a part of another"},
              {"target mesh: ", "a part of this cell lies on a part of another"}};
@@ -699,5 +721,5 @@ RT_MAIN(RT_CASE(one_rank_and_many_make_the_same), RT_CASE(cells_that_meet_nothin
         RT_CASE(aggregated_identical_meshes_are_the_mesh), RT_CASE(concave_faces_are_cut),
         RT_CASE(zones_that_touch_need_no_matching_faces), RT_CASE(zones_of_boxes_are_joined_without_rounding),
         RT_CASE(zones_that_overlap_by_rounding_count_once),
-        RT_CASE(zones_that_overlap_by_more_are_refused_by_name),
+        RT_CASE(zones_that_overlap_by_more_are_refused_by_name), RT_CASE(parts_of_a_zone_that_do_not_match_are_refused_by_name),
         RT_CASE(a_cell_without_thickness_on_half_a_face_is_not_there), RT_CASE(every_refusal_names_a_cell))

@@ -1,6 +1,6 @@
 /* contacts -- which zones of a mesh touch where their faces do not match: a skin triangle of one has a point in common with a
- * skin triangle of the other that is no corner or edge of both. Exact. Cells with skin come together by boxes, as for a
- * supermesh of the mesh with itself; O(n log n) for n faces of the skin, wherever zones touch. */
+ * skin triangle of the other that is no corner or edge of both; and where a zone so touches itself. Exact. Cells with skin come
+ * together by boxes, as for a supermesh of the mesh with itself; O(n log n) for n faces of the skin, wherever zones touch. */
 #include "super/super_private.h"
 
 #include <stdlib.h>
@@ -13,6 +13,8 @@ typedef struct work {
   const rm_cover     *cover;
   const rm_trimesh   *mesh[2]; /* of the pieces of the cover */
   rm_lid              triangle; /* of mesh[0], that is looked at */
+  bool                within;   /* contacts of a zone with itself are looked for: */
+  rm_gid              cell[2];  /* the least two cells that have one, ascending; INT64_MAX */
   uint64_t           *pair;     /* zones in contact, the lower one in the upper half */
   int64_t             num_pairs, pair_room;
   remap_status        status;
@@ -88,22 +90,44 @@ static int64_t zone_at(const work *w, int piece, rm_lid cell)
   return rm_zone_of(&w->job->zones[w->side], w->cover->part.piece[piece].cell_global[cell]);
 }
 
+/* Do the triangle that is looked at and another one touch without matching? */
+static bool is_contact(const work *w, rm_lid other)
+{
+  const rm_lid  t[2] = {w->triangle, other};
+  const double *corner[2][3];
+
+  for (int s = 0; s < 2; s++)
+    for (int h = 0; h < 3; h++) corner[s][h] = w->mesh[s]->vertex[w->mesh[s]->triangle[t[s]][h]];
+  return do_not_match(corner[0], corner[1]);
+}
+
+/* Two cells of one zone, of which the lower one comes first. */
+static void look_within(work *w, rm_lid item)
+{
+  const rm_piece *p    = w->cover->part.piece;
+  const rm_lid    t    = w->mesh[1]->skin[item], other = owner_of(w->mesh[1], t), mine = owner_of(w->mesh[0], w->triangle);
+  const rm_gid    a    = p[0].cell_global[mine], b = other < 0 ? -1 : p[1].cell_global[other];
+
+  if (a >= b || zone_at(w, 0, mine) != zone_at(w, 1, other)) return;
+  if (a > w->cell[0] || (a == w->cell[0] && b >= w->cell[1]) || !is_contact(w, t)) return;
+  w->cell[0] = a;
+  w->cell[1] = b;
+}
+
 static int look_at(void *user, rm_lid item)
 {
   work        *w = user;
   const rm_lid t[2] = {w->triangle, w->mesh[1]->skin[item]}, other = owner_of(w->mesh[1], t[1]);
-  const double *corner[2][3];
 
-  if (other < 0) return 0;
+  if (w->within) look_within(w, item);
+  if (w->within || other < 0) return 0;
   const int64_t  x = zone_at(w, 0, owner_of(w->mesh[0], t[0])), y = zone_at(w, 1, other);
   const uint64_t pair = x < y ? (uint64_t)x << 32 | (uint64_t)y : (uint64_t)y << 32 | (uint64_t)x;
 
   if (x == y) return 0;
   for (int64_t k = w->num_pairs - 1; k >= 0; k--)
     if (w->pair[k] == pair) return 0;
-  for (int s = 0; s < 2; s++)
-    for (int h = 0; h < 3; h++) corner[s][h] = w->mesh[s]->vertex[w->mesh[s]->triangle[t[s]][h]];
-  if (!do_not_match(corner[0], corner[1])) return 0;
+  if (!is_contact(w, t[1])) return 0;
   w->status = rm_grow(&w->pair, &w->pair_room, w->num_pairs + 1, sizeof *w->pair);
   if (w->status == REMAP_OK) w->pair[w->num_pairs++] = pair;
   return w->status != REMAP_OK;
@@ -177,7 +201,8 @@ static remap_status colour_zones(const work *w, int64_t *colour, int *num_colour
   return REMAP_OK;
 }
 
-static remap_status contacts(work *w, int64_t *colour, int *num_colours, rm_reason *reason)
+/* What this rank has to look at, and that done. Collective. */
+static remap_status look(work *w, rm_reason *reason)
 {
   const rm_mesh       *m       = w->job->mesh[w->side];
   const rm_mesh *const twice[2] = {m, m};
@@ -186,8 +211,7 @@ static remap_status contacts(work *w, int64_t *colour, int *num_colours, rm_reas
 
   RM_TRY(rm_comm_agree(w->job->comm, skin_cells(w, m, &zone), NULL));
   RM_TRY(rm_part_cover(w->passing, w->job->comm, w->job->frame, twice, &zone, REMAP_IN_SOURCE, all, &w->cover, reason));
-  RM_TRY(rm_comm_agree(w->job->comm, look_around(w), NULL));
-  return colour_zones(w, colour, num_colours);
+  return rm_comm_agree(w->job->comm, look_around(w), NULL);
 }
 
 remap_status rm_super_colour_zones(const rm_super_job *job, int side, int64_t *colour, int *num_colours, rm_reason *reason)
@@ -196,9 +220,30 @@ remap_status rm_super_colour_zones(const rm_super_job *job, int side, int64_t *c
   remap_status status;
 
   RM_GOTO(done, status = rm_comm_agree(job->comm, w.passing ? REMAP_OK : REMAP_NO_MEMORY, NULL));
-  status = contacts(&w, colour, num_colours, reason);
+  RM_GOTO(done, status = look(&w, reason));
+  status = colour_zones(&w, colour, num_colours);
 done:
   free(w.pair);
+  rm_arena_drop(w.passing);
+  return status;
+}
+
+remap_status rm_super_find_contact(const rm_super_job *job, int side, rm_gid cell[2], rm_reason *reason)
+{
+  work         w = {.passing = rm_arena_new(), .job = job, .side = side, .within = true, .cell = {INT64_MAX, INT64_MAX}};
+  int64_t      least;
+  remap_status status;
+
+  RM_GOTO(done, status = rm_comm_agree(job->comm, w.passing ? REMAP_OK : REMAP_NO_MEMORY, NULL));
+  RM_GOTO(done, status = look(&w, reason));
+  least = -w.cell[0];
+  RM_GOTO(done, status = rm_comm_max_i64(job->comm, &least, 1));
+  cell[0] = -least;
+  least   = w.cell[0] == cell[0] ? -w.cell[1] : -INT64_MAX;
+  RM_GOTO(done, status = rm_comm_max_i64(job->comm, &least, 1));
+  cell[1] = -least;
+  if (cell[0] == INT64_MAX) cell[0] = cell[1] = -1;
+done:
   rm_arena_drop(w.passing);
   return status;
 }

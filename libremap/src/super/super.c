@@ -172,13 +172,34 @@ done:
   return status;
 }
 
+/* Does a mesh touch itself where nothing joins it? That is then what is wrong. Collective. */
+static remap_status explain_contact(const rm_super_job *job, int side, bool *found, rm_reason *reason)
+{
+  rm_reason    unused = {-1, -1, ""};
+  rm_gid       cell[2];
+  remap_status status = rm_super_find_contact(job, side, cell, &unused);
+
+  *found = status == REMAP_OK && cell[0] >= 0;
+  if (!*found) return status;
+  *reason = (rm_reason){-1, -1, ""};
+  (void)rm_fail(REMAP_BAD_MESH, reason, side, cell[0],
+                "a face of this cell meets one of the cell with global number %lld, but they do not match and no zone ends "
+                "there: let nodes agree, or make zones of parts that touch, which are joined",
+                (long long)cell[1]);
+  return REMAP_OK;
+}
+
 /* A failure in terms of the meshes that were given; parts of cells that two zones hold may be too thin once nodes are rounded.
  * Collective. */
-static remap_status explain(const rm_comm *comm, const rm_conformed whole[2], remap_status status, rm_reason *reason)
+static remap_status explain(const rm_super_job *job, const rm_conformed whole[2], remap_status status, rm_reason *reason)
 {
+  const rm_comm *comm  = job->comm;
+  bool           found = false;
+
   status = rm_comm_agree_reason(comm, status, reason); /* for all ranks to see the same side */
   if (reason->side >= 0 && whole[reason->side].mesh) rm_super_trace_reason(comm, &whole[reason->side], reason);
   for (int side = 0; side < 2 && status == REMAP_BAD_MESH; side++) {
+    if (!whole[side].mesh && !found) RM_TRY(explain_contact(job, side, &found, reason));
     if (!(whole[side].overlap > 0)) continue;
     *reason = (rm_reason){side, reason->side == side ? reason->global_cell : -1,
                           "its zones overlap by rounding, and parts of cells that two of them hold are too thin to be told "
@@ -217,7 +238,7 @@ remap_status rm_super_build(rm_arena *arena, const rm_super_job *job, const rm_s
   }
   if (status == REMAP_OK) {
     status = rm_super_make(arena, &whole_job, &super, reason);
-    if (status != REMAP_OK) status = explain(job->comm, whole, status, reason);
+    if (status != REMAP_OK) status = explain(job, whole, status, reason);
   }
   for (int side = 0; side < 2 && status == REMAP_OK; side++) {
     const double unit = 1 / job->frame->scale;

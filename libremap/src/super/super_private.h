@@ -149,6 +149,10 @@ int64_t rm_zone_of(const rm_zones *zones, rm_gid cell);
 /* Colours of the zones of one mesh, [zones], from 0; different where zones touch and faces do not match. Collective. */
 remap_status rm_super_colour_zones(const rm_super_job *job, int side, int64_t *colour, int *num_colours, rm_reason *reason);
 
+/* The least two cells of one zone, or of a mesh without zones, whose faces in the skin touch or cross and do not match; -1:
+ * none. Collective. */
+remap_status rm_super_find_contact(const rm_super_job *job, int side, rm_gid cell[2], rm_reason *reason);
+
 /* One mesh made conformal; out->mesh is NULL if it is. *arena, where it lives, may become another. Collective. ZONE_OVERLAP
  * where zones overlap by more than rounding, BAD_MESH where they cannot be joined. */
 remap_status rm_super_conform(rm_arena **arena, const rm_super_job *job, int side, rm_conformed *out, rm_reason *reason);
