@@ -104,19 +104,23 @@ INLINE void raise(double side[10], double height, const double r[3], int num_sum
   for (int c = 0; c < 3; c++) side[1 + c] += side[0] * r[c];
 }
 
-/* A cone about the slot's own origin, to that slot; n and v are a normal of the plane and a vertex in it. */
-static __attribute__((noinline)) void add_local(slot *s, double sign, const double n[3], const double v[3], const point *p,
+/* A side of polygons in one or two planes (the second may be NULL), about the slot's own origin, to that slot: the cone over it
+ * counts `sign` times in the first plane, -sign times in the second. */
+static __attribute__((noinline)) void add_local(slot *s, double sign, const plane *first, const plane *second, const point *p,
                                                 const point *q, int num_sums)
 {
-  double       a[3], b[3], k[3], both[3], foot[3], out[10];
-  const double height = rm_moments_foot(n, v, s->o, foot);
+  double a[3], b[3], a_x_b[3], both[3], foot[3], out[10];
 
   relative(p, s->o, a);
   relative(q, s->o, b);
-  cross(a, b, k);
+  cross(a, b, a_x_b);
   for (int c = 0; c < 3; c++) both[c] = a[c] + b[c];
-  cone(sign * height * dot(n, k), foot, a, b, both, num_sums, out);
-  for (int x = 0; x < num_sums; x++) s->sum[x] += out[x];
+  for (const plane *pl = first; pl; pl = pl == first ? second : NULL, sign = -sign) {
+    const double height = rm_moments_foot(pl->n, pl->v, s->o, foot);
+
+    cone(sign * height * dot(pl->n, a_x_b), foot, a, b, both, num_sums, out);
+    for (int x = 0; x < num_sums; x++) s->sum[x] += out[x];
+  }
 }
 
 /* ---- spots and cuts -------------------------------------------------------------------------------------------------- */
@@ -263,25 +267,26 @@ static __attribute__((noinline)) void add_local_piece(const work *w, slot *s, co
 
   rm_moments_set_point(w, 0, l->at->edge, k, &p);
   rm_moments_set_point(w, 0, l->at->edge, end, &q);
-  if (l->first) add_local(s, number, l->first->n, l->first->v, &p, &q, num_sums);
-  if (l->second) add_local(s, -number, l->second->n, l->second->v, &p, &q, num_sums);
+  if (l->first) add_local(s, number, l->first, l->second, &p, &q, num_sums);
+  else add_local(s, -number, l->second, NULL, &p, &q, num_sums);
 }
 
-/* The pieces of the line from point k to point `end`, at those lambda, in cell j, which winds about them that often. */
-INLINE void add_piece(work *w, rm_lid i, rm_lid j, const line *l, rm_lid k, rm_lid end, const double lambda[2], int number,
+/* The pieces of the line from point k to point `end`, at those lambda, in cell j, which winds about them that often. True if
+ * the pair is summed about the origin of cell i. */
+INLINE bool add_piece(work *w, rm_lid i, rm_lid j, const line *l, rm_lid k, rm_lid end, const double lambda[2], int number,
                       int num_sums)
 {
   const int    z = find_slot(w, i, j);
   const double length = number * (lambda[1] - lambda[0]), d = length * l->d, sum = lambda[0] + lambda[1];
   double       s[3];
 
-  if (z < 0) return;
+  if (z < 0) return false;
   slot *to = &w->slots[z];
   to->num_cones += l->num_cones;
   to->kinds |= l->kind;
   if (to->is_local) {
     add_local_piece(w, to, l, k, end, number, num_sums);
-    return;
+    return false;
   }
   to->sum[0] += d;
   for (int c = 0; c < 3; c++) {
@@ -294,6 +299,7 @@ INLINE void add_piece(work *w, rm_lid i, rm_lid j, const line *l, rm_lid k, rm_l
     const double qx = l->a[x] + lambda[1] * l->u[x], qy = l->a[y] + lambda[1] * l->u[y];
     to->sum[4 + h] += d * (px * py + qx * qy + s[x] * s[y]) + length * (l->dr[x] * s[y] + l->dr[y] * s[x] + l->drr[h]);
   }
+  return true;
 }
 
 /* lambda of point k of an edge of mesh 1. */
@@ -320,7 +326,7 @@ static __attribute__((noinline)) void add_tangled(work *w, rm_lid i, const line 
   }
 }
 
-/* All pieces of an edge of cell i; its crossings become spots. */
+/* All pieces of an edge of cell i; crossings behind those that are summed here become spots, for segments will want them. */
 INLINE void add_pieces_of(work *w, rm_lid i, const wedge *at, int num_sums)
 {
   const rm_trace    *tr = &w->o->trace[0];
@@ -332,14 +338,15 @@ INLINE void add_pieces_of(work *w, rm_lid i, const wedge *at, int num_sums)
 
   set_line(w, at, num_sums, &l);
   for (rm_lid k = 0; k <= count; k++) {
-    const rm_lid next = k < count ? x[k].state : RM_OUTSIDE;
+    const rm_lid next     = k < count ? x[k].state : RM_OUTSIDE;
+    bool         is_plain = false;
 
     lambda[1] = k < count ? x[k].lambda : 1;
     if (before < RM_OUTSIDE || in < RM_OUTSIDE || next < RM_OUTSIDE || (in >= 0 && (in == before || in == next)))
       add_tangled(w, i, &l, k, num_sums);
     else if (in >= 0)
-      add_piece(w, i, in, &l, k, k + 1, lambda, 1, num_sums);
-    if (k < count) set_spot(w, 2 * (uint32_t)(tr->first[at->edge] + k), l.a, lambda[1], l.u);
+      is_plain = add_piece(w, i, in, &l, k, k + 1, lambda, 1, num_sums);
+    if (k < count && is_plain) set_spot(w, 2 * (uint32_t)(tr->first[at->edge] + k), l.a, lambda[1], l.u);
     before    = in;
     in        = next;
     lambda[0] = lambda[1];
@@ -351,20 +358,16 @@ INLINE void add_pieces_of(work *w, rm_lid i, const wedge *at, int num_sums)
 static __attribute__((noinline)) void add_local_segment(work *w, const own_facet *f, const cut *c, rm_end start, rm_end end,
                                                         int num_sums)
 {
-  const rm_trimesh *m = w->o->mesh[1];
-  const rm_lid      b = start.other;
+  const rm_trimesh *m  = w->o->mesh[1];
+  const rm_lid      b  = start.other;
+  const plane       pb = {1, b, m->normal[b], m->vertex[m->triangle[b][0]]};
   point             p, q;
 
   rm_moments_set_crossing(w, start.at >> 1 & 1, start.at >> 2, &p);
   rm_moments_set_crossing(w, end.at >> 1 & 1, end.at >> 2, &q);
-  for (int h = 0; h < 2; h++) {
-    if (c->slot[h] < 0 || c->plain[h] >= 0) continue;
-    slot        *s    = &w->slots[c->slot[h]];
-    const double sign = h ? -f->outward : f->outward;
-
-    add_local(s, sign, f->in.n, f->in.v, &p, &q, num_sums);
-    add_local(s, -sign, m->normal[b], m->vertex[m->triangle[b][0]], &p, &q, num_sums);
-  }
+  for (int h = 0; h < 2; h++)
+    if (c->slot[h] >= 0 && c->plain[h] < 0)
+      add_local(&w->slots[c->slot[h]], h ? -f->outward : f->outward, &f->in, &pb, &p, &q, num_sums);
 }
 
 /* Find the cut and the spots of every segment in a facet of cell i: apart from the arithmetic, so that many are on their way
@@ -419,14 +422,15 @@ INLINE void add_segments(work *w, const own_facet *f, int first, int last, int n
 static __attribute__((noinline)) void add_local_foreign(work *w, const cut *c, rm_lid b, rm_lid f, rm_lid k, rm_lid end,
                                                         int number, int num_sums)
 {
-  const rm_trimesh *m = w->o->mesh[1];
+  const rm_trimesh *m  = w->o->mesh[1];
+  const plane       pb = {1, b, m->normal[b], m->vertex[m->triangle[b][0]]};
   point             p, q;
 
   rm_moments_set_point(w, 1, f, k, &p);
   rm_moments_set_point(w, 1, f, end, &q);
   for (int h = 0; h < 2; h++)
     if (c->slot[h] >= 0 && c->plain[h] < 0)
-      add_local(&w->slots[c->slot[h]], h ? -number : number, m->normal[b], m->vertex[m->triangle[b][0]], &p, &q, num_sums);
+      add_local(&w->slots[c->slot[h]], h ? -number : number, &pb, NULL, &p, &q, num_sums);
 }
 
 /* Point k of edge f of mesh 2, relative to the centre of cell i; it may be computed in `own`. */
