@@ -78,7 +78,8 @@ remap_status rm_moments_file_pieces(work *w)
 
   RM_NEW0(w->piece_offset, w->scratch, (int64_t)nc + 2);
   for (int pass = 0; pass < 2; pass++) {
-    for (rm_lid f = 0; f < ne; f++)
+    for (rm_lid f = 0; f < ne; f++) {
+      if (t->count[f] == 0 && t->state[f] == RM_OUTSIDE) continue;
       for (rm_lid k = 0; k <= t->count[f]; k++) {
         const rm_lid     state = k ? t->crossing[t->first[f] + k - 1].state : t->state[f];
         const rm_winding one   = {state, 1};
@@ -93,6 +94,7 @@ remap_status rm_moments_file_pieces(work *w)
           }
         }
       }
+    }
     if (pass == 0) {
       for (rm_lid i = 0; i < nc; i++) w->piece_offset[i + 2] += w->piece_offset[i + 1];
       RM_NEW(w->piece, w->scratch, w->piece_offset[nc + 1]);
