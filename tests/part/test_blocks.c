@@ -130,5 +130,16 @@ static void sources_that_meet_everything_make_one_block(void)
   }
 }
 
+static void small_ranks_cut_blocks_too_unless_these_would_have_too_few_triangles(void)
+{
+  for (int kind = 0; kind < pairs_num_kinds(); kind++) {
+    const int64_t some = most_blocks(kind, (rm_slicing){INT64_MAX, INFINITY, 4, 1});
+
+    RT_CHECK(some <= 4 && (kind != PAIRS_PARTLY || some > 1));
+    RT_EQ(most_blocks(kind, (rm_slicing){INT64_MAX, INFINITY, 4, INT64_MAX}), 1);
+  }
+}
+
 RT_MAIN(RT_CASE(every_pair_of_cells_with_meeting_boxes_is_made_in_one_block_of_one_rank),
-        RT_CASE(sources_that_meet_everything_make_one_block))
+        RT_CASE(sources_that_meet_everything_make_one_block),
+        RT_CASE(small_ranks_cut_blocks_too_unless_these_would_have_too_few_triangles))
