@@ -19,7 +19,15 @@ typedef struct walker {
   ra_array       file; /* hid_t for each source of the tree */
   rcgns_message *message;
   bool           no_memory; /* somewhere on the way: then a link that leads nowhere need not be dead */
+  bool           is_damaged; /* HDF5 has failed: it may not survive to be asked for more of the file */
 } walker;
+
+/* What HDF5 answers to a question that any sound file has an answer to. */
+static int64_t sound(walker *w, int64_t answer)
+{
+  w->is_damaged |= answer < 0;
+  return answer;
+}
 
 static hid_t file_of(const walker *w, int source) { return ((hid_t *)w->file.item)[source]; }
 
@@ -34,17 +42,18 @@ bool rc_h5_is_file(const char *path)
 }
 
 /* A fixed-length string attribute, trimmed; empty if it is absent or something else. */
-static void read_attribute(hid_t group, const char *name, char *out, size_t size)
+static void read_attribute(walker *w, hid_t group, const char *name, char *out, size_t size)
 {
   hid_t attribute, stored, memory;
 
   memset(out, 0, size);
-  if (H5Aexists(group, name) <= 0 || (attribute = H5Aopen(group, name, H5P_DEFAULT)) < 0) return;
+  if (w->is_damaged || sound(w, H5Aexists(group, name)) <= 0) return;
+  if ((attribute = sound(w, H5Aopen(group, name, H5P_DEFAULT))) < 0) return;
   stored = H5Aget_type(attribute);
   memory = H5Tcopy(H5T_C_S1);
   if (H5Tget_class(stored) == H5T_STRING && H5Tis_variable_str(stored) == 0 &&
       H5Aget_storage_size(attribute) == H5Tget_size(stored) && H5Tset_size(memory, size) >= 0 &&
-      H5Aread(attribute, memory, out) < 0)
+      sound(w, H5Aread(attribute, memory, out)) < 0)
     memset(out, 0, size);
   out[size - 1] = 0;
   for (size_t n = strlen(out); n && out[n - 1] == ' '; n--) out[n - 1] = 0;
@@ -119,7 +128,8 @@ static rcgns_status payload(walker *w, hid_t group, rc_node *n)
   rcgns_status status = RCGNS_OK;
   void        *small  = NULL;
 
-  if (H5Lexists(group, " data", H5P_DEFAULT) <= 0 || (data = H5Dopen2(group, " data", H5P_DEFAULT)) < 0) return RCGNS_OK;
+  if (w->is_damaged || sound(w, H5Lexists(group, " data", H5P_DEFAULT)) <= 0) return RCGNS_OK;
+  if ((data = sound(w, H5Dopen2(group, " data", H5P_DEFAULT))) < 0) return RCGNS_OK;
   space = H5Dget_space(data);
   nd    = H5Sget_simple_extent_ndims(space);
   if (nd > 0 && nd <= RC_MAX_DIMS) {
@@ -153,11 +163,12 @@ static char *read_text(walker *w, hid_t group, const char *name)
   char   *text = NULL;
   int64_t count;
 
-  if (H5Lexists(group, name, H5P_DEFAULT) <= 0 || (data = H5Dopen2(group, name, H5P_DEFAULT)) < 0) return NULL;
+  if (w->is_damaged || sound(w, H5Lexists(group, name, H5P_DEFAULT)) <= 0) return NULL;
+  if ((data = sound(w, H5Dopen2(group, name, H5P_DEFAULT))) < 0) return NULL;
   space = H5Dget_space(data);
   count = (int64_t)H5Sget_simple_extent_npoints(space);
   if (count > 0 && count < 1 << 16 && !(text = calloc((size_t)count + 1, 1))) w->no_memory = true;
-  if (text && H5Dread(data, H5T_NATIVE_SCHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
+  if (text && sound(w, H5Dread(data, H5T_NATIVE_SCHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, text)) < 0) {
     free(text);
     text = NULL;
   }
@@ -240,10 +251,11 @@ static hid_t open_path(walker *w, int *source, const char *path, char **found, i
     if (n < sizeof name) {
       memcpy(name, path, n);
       name[n] = 0;
-      if (*name != ' ' && H5Lexists(group, name, H5P_DEFAULT) > 0) next = H5Gopen2(group, name, H5P_DEFAULT);
+      if (*name != ' ' && !w->is_damaged && sound(w, H5Lexists(group, name, H5P_DEFAULT)) > 0)
+        next = H5Gopen2(group, name, H5P_DEFAULT);
     }
     if (next >= 0) {
-      read_attribute(next, "type", type, sizeof type);
+      read_attribute(w, next, "type", type, sizeof type);
       if (!strcmp(type, "LK")) {
         const hid_t to = follow(w, next, source, &down, depth);
 
@@ -311,14 +323,27 @@ static herr_t collect(hid_t group, const char *name, const H5L_info_t *info, voi
 
 static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int depth);
 
+/* A child, open; -1: it is no group, or a link of HDF5's own leads nowhere. */
+static hid_t open_child(walker *w, hid_t group, const char *name)
+{
+  H5L_info_t link;
+  H5O_info_t object;
+
+  if (w->is_damaged || sound(w, H5Lget_info(group, name, &link, H5P_DEFAULT)) < 0) return -1;
+  if (link.type != H5L_TYPE_HARD) return H5Gopen2(group, name, H5P_DEFAULT);
+  if (sound(w, H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT)) < 0) return -1;
+  return object.type == H5O_TYPE_GROUP ? sound(w, H5Gopen2(group, name, H5P_DEFAULT)) : -1;
+}
+
 /* The children in the order of their making, or by name where the file does not keep it. */
 static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source, int depth)
 {
   names        list   = {.no_memory = false};
   unsigned     flags  = 0;
-  hid_t        made   = H5Gget_create_plist(group);
+  hid_t        made   = sound(w, H5Gget_create_plist(group));
   rcgns_status status = RCGNS_OK;
 
+  if (made < 0) return RCGNS_OK;
   H5Pget_link_creation_order(made, &flags);
   H5Pclose(made);
   if (H5Literate(group, flags & H5P_CRT_ORDER_TRACKED ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME, H5_ITER_INC, NULL, collect, &list) <
@@ -331,7 +356,7 @@ static rcgns_status walk_children(walker *w, hid_t group, int64_t me, int source
     rc_node n     = {.file = source, .link_file = -1, .link_path = -1, .anchor = -1, .small = -1};
     hid_t   child = -1;
 
-    if (status == RCGNS_OK && strlen(name) < sizeof n.name && (child = H5Gopen2(group, name, H5P_DEFAULT)) >= 0) {
+    if (status == RCGNS_OK && strlen(name) < sizeof n.name && (child = open_child(w, group, name)) >= 0) {
       strcpy(n.name, name);
       status = walk(w, child, me, n, depth);
       H5Gclose(child);
@@ -351,7 +376,7 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
 
   if (depth > MAX_DEPTH || w->tree->node.count > MAX_NODES)
     return rc_fail(w->message, RCGNS_IO, "%s: its tree has no end: does a link lead back to itself?", path_of(w, 0));
-  read_attribute(group, "type", n.type, sizeof n.type);
+  read_attribute(w, group, "type", n.type, sizeof n.type);
   if (!strcmp(n.type, "LK")) {
     file        = read_text(w, group, " file");
     path        = read_text(w, group, " path");
@@ -362,15 +387,19 @@ static rcgns_status walk(walker *w, hid_t group, int64_t parent, rc_node n, int 
     n.is_dead   = at < 0 || is_above(w, parent, n.file, found);
     memcpy(n.type, "MT", 3);
     if (at >= 0) {
-      read_attribute(at, "type", n.type, sizeof n.type);
+      read_attribute(w, at, "type", n.type, sizeof n.type);
       n.anchor = rc_tree_store(w->tree, found, (int64_t)strlen(found) + 1);
     }
     if (w->no_memory || n.link_file < 0 || n.link_path < 0 || (at >= 0 && n.anchor < 0)) status = rc_no_memory(w->message);
   }
-  if (!n.is_dead) read_attribute(at, "label", n.label, sizeof n.label);
+  if (!n.is_dead) read_attribute(w, at, "label", n.label, sizeof n.label);
   if (status == RCGNS_OK && !n.is_dead && parent >= 0) status = payload(w, at, &n);
+  if (status == RCGNS_OK && w->is_damaged)
+    status = rc_fail(w->message, RCGNS_IO, "%s: the file is damaged at node %s", path_of(w, n.file), *n.name ? n.name : "/");
   if (status == RCGNS_OK && (me = rc_tree_add(w->tree, parent, &n)) < 0) status = rc_no_memory(w->message);
   if (status == RCGNS_OK && !n.is_dead) status = walk_children(w, at, me, n.file, depth + 1);
+  if (status == RCGNS_OK && w->is_damaged)
+    status = rc_fail(w->message, RCGNS_IO, "%s: the file is damaged below node %s", path_of(w, n.file), *n.name ? n.name : "/");
   if (at != group && at >= 0) H5Gclose(at);
   free(found);
   free(file);
@@ -393,7 +422,7 @@ static rcgns_status walk_all(walker *w)
   }
   ((hid_t *)w->file.item)[w->file.count++] = file;
   group                                    = H5Gopen2(file, "/", H5P_DEFAULT);
-  if (group < 0) return rc_fail(w->message, RCGNS_IO, "%s: it has no root group: the file is damaged", path);
+  if (sound(w, group) < 0) return rc_fail(w->message, RCGNS_IO, "%s: it has no root group: the file is damaged", path);
   status = walk(w, group, -1, root, 0);
   H5Gclose(group);
   return status;
@@ -407,6 +436,7 @@ rcgns_status rc_h5_walk(rc_tree *tree, rcgns_message *message)
   RC_QUIETLY(status = walk_all(&w));
   for (int64_t i = 0; i < w.file.count; i++) RC_QUIETLY(H5Fclose(file_of(&w, (int)i)));
   ra_drop(&w.file);
+  if (w.is_damaged) H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* else HDF5 prints at exit that it could not close the file */
   return status;
 }
 

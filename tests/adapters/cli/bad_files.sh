@@ -7,11 +7,17 @@ cd "$work" || exit 1
 head -c 9000 good.cgns >cut_off.cgns
 echo "no mesh at all" >text.cgns
 : >empty.cgns
+for place in 96 1504; do # of the root, and of the first node below it
+  cp good.cgns "damaged$place.cgns"
+  head -c 16 /dev/zero | tr '\0' '\377' | dd of="damaged$place.cgns" bs=1 seek="$place" conv=notrunc 2>dd.log
+done
 
 refused 5 absent.cgns "a missing source is named" absent.cgns mesh.cgns -o out/result.cgns
 refused 5 absent.cgns "a missing target is named" good.cgns absent.cgns -o out/result.cgns
 refused 5 cut_off.cgns "a truncated file is refused" cut_off.cgns mesh.cgns -o out/result.cgns
 refused 5 cut_off.cgns "a truncated target is refused" good.cgns cut_off.cgns -o out/result.cgns
+refused 5 damaged96.cgns "a file without a root is refused" good.cgns damaged96.cgns -o out/result.cgns
+refused 5 damaged1504.cgns "a file that is damaged within is refused" damaged1504.cgns mesh.cgns -o out/result.cgns
 refused 5 text.cgns "a file that is not CGNS is refused" text.cgns mesh.cgns -o out/result.cgns
 refused 5 empty.cgns "an empty file is refused" good.cgns empty.cgns -o out/result.cgns
 refused 5 out: "a folder is no CGNS file" out mesh.cgns -o out/result.cgns
