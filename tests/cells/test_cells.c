@@ -1,5 +1,6 @@
 /* The supermesh of small meshes: closed cells, volumes against the moments, faces against the faces they came from,
  * conformity. */
+#include <time.h>
 #include "spaced.h"
 #include "super.h"
 
@@ -306,11 +307,13 @@ static double cross_plate(int n, bool check)
   for (int j = 1; j < g; j += 2)
     for (int i = 1; i < g; i += 2) keep[j * g + i] = 1;
   for (int k = 0; k < (check ? 1 : 3); k++) {
-    super s = super_of(plate, grid, REMAP_FACES_CENTRE, &(laid_how){.keep = {NULL, keep}}, SUPER_UNION);
+    const clock_t start = clock();
+    super         s     = super_of(plate, grid, REMAP_FACES_CENTRE, &(laid_how){.keep = {NULL, keep}}, SUPER_UNION);
+    const clock_t end   = clock();
     if (check) super_check(&s, -1, false);
     if (RT_EQ(s.status, REMAP_OK)) {
       RT_EQ(s.cells->num_cells, 1 + 3 * n * n);
-      least = fmin(least, s.cells->seconds_polygons + s.cells->seconds_glue + s.cells->seconds_faces);
+      least = fmin(least, (double)(end - start) / CLOCKS_PER_SEC);
     }
     laid_free(s.l);
   }

@@ -509,8 +509,9 @@ REMAP_API void remap_supermesh_options_default(remap_supermesh_options *options)
  *  Neither the overlay nor a transfer is touched. Each rank makes an even share of the cells. A closed surface is a mesh of
  *  one cell. Cells of one mesh must not overlap, cross each other or be inverted; faces may be warped, coincide with others,
  *  have no area, and cells no volume. Zones of one mesh (num_zones) may touch without matching faces: they are joined first,
- *  with the nodes that are missing, some rounded, in their faces. They may overlap by rounding too: see zone_overlap of the
- *  view. options must agree on all ranks; NULL means the defaults.
+ *  with the nodes that are missing, some rounded, in their faces; in planes askew to the axes that may leave cells that
+ *  overlap by rounding, which is BAD_MESH. Zones as they are lent may overlap by rounding: see zone_overlap of the view.
+ *  options must agree on all ranks; NULL means the defaults.
  *  Errors: BAD_ORDER (a mesh is missing), BAD_ARGUMENT, BAD_MESH, ZONE_OVERLAP (by more than rounding), TOO_LARGE, NO_MEMORY,
  *  MPI_FAILURE, CANCELLED, INCONSISTENT; remap_message tells which cell, where it is one. */
 REMAP_API remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *options, remap_supermesh_view *out);

@@ -3,6 +3,7 @@
  * whose faces do not match. */
 #include "super/super_private.h"
 
+#include <stdio.h>
 #include <string.h>
 
 typedef struct work {
@@ -189,6 +190,15 @@ static remap_status explain_contact(const rm_super_job *job, int side, bool *fou
   return REMAP_OK;
 }
 
+/* Zones that touch were joined, but not all nodes of that are doubles. */
+static void tell_of_rounding(rm_reason *reason)
+{
+  const size_t length = strlen(reason->text);
+
+  (void)snprintf(reason->text + length, sizeof reason->text - length,
+                 ". Its zones were joined by nodes that are rounded, which may be why: let nodes agree where zones touch");
+}
+
 /* A failure in terms of the meshes that were given; parts of cells that two zones hold may be too thin once nodes are rounded.
  * Collective. */
 static remap_status explain(const rm_super_job *job, const rm_conformed whole[2], remap_status status, rm_reason *reason)
@@ -200,6 +210,7 @@ static remap_status explain(const rm_super_job *job, const rm_conformed whole[2]
   if (reason->side >= 0 && whole[reason->side].mesh) rm_super_trace_reason(comm, &whole[reason->side], reason);
   for (int side = 0; side < 2 && status == REMAP_BAD_MESH; side++) {
     if (!whole[side].mesh && !found) RM_TRY(explain_contact(job, side, &found, reason));
+    if (whole[side].mesh && reason->side == side && !(whole[side].overlap > 0)) tell_of_rounding(reason);
     if (!(whole[side].overlap > 0)) continue;
     *reason = (rm_reason){side, reason->side == side ? reason->global_cell : -1,
                           "its zones overlap by rounding, and parts of cells that two of them hold are too thin to be told "
