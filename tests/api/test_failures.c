@@ -198,6 +198,28 @@ static void memory_that_runs_out_anywhere_in_a_move_is_told_to_all(void) { exhau
 static void memory_that_runs_out_anywhere_in_a_transfer_of_systems_is_told_to_all(void) { exhaust(SYSTEMS); }
 static void memory_that_runs_out_anywhere_in_a_supermesh_is_told_to_all(void) { exhaust(SUPERMESH); }
 
+/* On the overlay that is there: what ranks have prepared of it is on all of them or on none. */
+static void a_transfer_that_ran_out_of_memory_is_made_again_without_a_build(void)
+{
+  int   failed = 0;
+  bool  comes  = true;
+  world w;
+
+  open_world(&w, 3, SYSTEMS);
+  for (int n = 0; comes && n < 2000; n++) {
+    RT_EQ(remap_build(w.ctx), REMAP_OK);
+    heap.left                 = is_last() ? n : -1;
+    const remap_status status = transfer_systems(&w);
+    comes                     = !rt_all(!is_last() || heap.left >= 0);
+    heap.left                 = -1;
+    if (!is_agreed(status)) break;
+    failed += status == REMAP_NO_MEMORY;
+    if (!rt_all(RT_EQ(transfer_systems(&w), REMAP_OK))) break;
+  }
+  RT_CHECK(!comes && failed > 30);
+  close_world(&w);
+}
+
 static void cancelling_at_any_call_stops_all_ranks(void)
 {
   for (work what = BUILD; what <= SUPERMESH; what++) {
@@ -303,6 +325,7 @@ static void pairs_without_memory_are_refused_with_a_message_and_handed_out_later
 RT_MAIN(RT_CASE(memory_that_runs_out_anywhere_in_build_mask_or_transfer_is_told_to_all),
         RT_CASE(memory_that_runs_out_anywhere_in_a_move_is_told_to_all),
         RT_CASE(memory_that_runs_out_anywhere_in_a_transfer_of_systems_is_told_to_all),
-        RT_CASE(memory_that_runs_out_anywhere_in_a_supermesh_is_told_to_all), RT_CASE(cancelling_at_any_call_stops_all_ranks),
+        RT_CASE(memory_that_runs_out_anywhere_in_a_supermesh_is_told_to_all),
+        RT_CASE(a_transfer_that_ran_out_of_memory_is_made_again_without_a_build), RT_CASE(cancelling_at_any_call_stops_all_ranks),
         RT_CASE(bad_data_of_one_rank_fail_on_all), RT_CASE(an_option_of_one_rank_fails_on_all),
         RT_CASE(pairs_without_memory_are_refused_with_a_message_and_handed_out_later))

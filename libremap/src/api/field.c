@@ -148,7 +148,7 @@ static rm_transfer_setup setup_of(remap_context *ctx, remap_direction direction,
 /* Make the stencil that a side needs in a role, unless it is there; with weights where fields get slopes. Collective. */
 static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_giving, bool is_weighed)
 {
-  const rm_stencil **stencil = stencil_of(ctx, side, is_giving);
+  const rm_stencil **stencil = stencil_of(ctx, side, is_giving), *weighed = NULL;
   const uint8_t     *mask    = is_giving ? ctx->gives[side] : ctx->wants[side];
 
   if (!mask && !ctx->stencil_arena[side]) ctx->stencil_arena[side] = rm_arena_new();
@@ -158,7 +158,9 @@ static remap_status need_stencil(remap_context *ctx, remap_side side, bool is_gi
     RM_TRY(rm_stencil_build(arena, &ctx->comm, &ctx->frame, ctx->mesh[side], mask, stencil));
   }
   if (!is_weighed || (*stencil)->weight) return REMAP_OK;
-  return rm_comm_agree(&ctx->comm, rm_stencil_weigh(arena, ctx->mesh[side], *stencil, stencil), NULL);
+  RM_TRY(rm_comm_agree(&ctx->comm, rm_stencil_weigh(arena, ctx->mesh[side], *stencil, &weighed), NULL));
+  *stencil = weighed; /* on all ranks or on none */
+  return REMAP_OK;
 }
 
 /* Second moments of both sides' cells. Collective. */
