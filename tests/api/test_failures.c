@@ -326,6 +326,7 @@ RT_MAIN(RT_CASE(memory_that_runs_out_anywhere_in_build_mask_or_transfer_is_told_
         RT_CASE(memory_that_runs_out_anywhere_in_a_move_is_told_to_all),
         RT_CASE(memory_that_runs_out_anywhere_in_a_transfer_of_systems_is_told_to_all),
         RT_CASE(memory_that_runs_out_anywhere_in_a_supermesh_is_told_to_all),
-        RT_CASE(a_transfer_that_ran_out_of_memory_is_made_again_without_a_build), RT_CASE(cancelling_at_any_call_stops_all_ranks),
+        RT_CASE(a_transfer_that_ran_out_of_memory_is_made_again_without_a_build),
+        RT_CASE(cancelling_at_any_call_stops_all_ranks),
         RT_CASE(bad_data_of_one_rank_fail_on_all), RT_CASE(an_option_of_one_rank_fails_on_all),
         RT_CASE(pairs_without_memory_are_refused_with_a_message_and_handed_out_later))

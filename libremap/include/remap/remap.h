@@ -303,7 +303,8 @@ typedef struct remap_stats {
                                        where an overlap has its rim in the other mesh, while cells deep in two zones may be
                                        left out. 0: none */
   int64_t zone_overlap_cell[2][2]; /**< [side] their global ids, -1 if none */
-  int64_t crossings;              /**< edges of one mesh through triangles of the other */
+  int64_t crossings;              /**< edges of one mesh through triangles of the other, counted on every rank, and in every
+                                       block of its cells, that walks along the edge: it depends on how cells are dealt out */
   double  seconds_partition, seconds_overlay; /**< wall clock, slowest rank */
   double  seconds_transfer; /**< wall clock of all calls of remap_field since, on this rank */
 } remap_stats;
@@ -511,7 +512,8 @@ REMAP_API void remap_supermesh_options_default(remap_supermesh_options *options)
  *  have no area, and cells no volume. Zones of one mesh (num_zones) may touch without matching faces: they are joined first,
  *  with the nodes that are missing, some rounded, in their faces; in planes askew to the axes that may leave cells that
  *  overlap by rounding, which is BAD_MESH. Zones as they are lent may overlap by rounding: see zone_overlap of the view.
- *  options must agree on all ranks; NULL means the defaults.
+ *  Cells that overlap all the same are noticed where their parts meet on one rank: whether they are refused can depend on the
+ *  number of ranks. options must agree on all ranks; NULL means the defaults.
  *  Errors: BAD_ORDER (a mesh is missing), BAD_ARGUMENT, BAD_MESH, ZONE_OVERLAP (by more than rounding), TOO_LARGE, NO_MEMORY,
  *  MPI_FAILURE, CANCELLED, INCONSISTENT; remap_message tells which cell, where it is one. */
 REMAP_API remap_status remap_supermesh(remap_context *ctx, const remap_supermesh_options *options, remap_supermesh_view *out);
