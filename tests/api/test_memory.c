@@ -87,7 +87,8 @@ static void moving_fields_takes_a_stencil_and_what_travels_once(void)
 {
   const double one = moving_takes(20, 1), many = moving_takes(20, 9);
 
-  if (!RT_CHECK(one <= 950 && many - one <= 8 * 90)) printf("# one field %.0f, 9 fields %.0f bytes per target cell\n", one, many);
+  if (!RT_CHECK(one <= 950 && many - one <= 8 * 90))
+    printf("# one field %.0f, 9 fields %.0f bytes per target cell\n", one, many);
 }
 
 static void without_blocks_the_peak_is_that_of_a_whole_overlay(void)

@@ -179,7 +179,8 @@ static void run_all(tm_mesh *source, tm_mesh *target, remap_faces faces, int kee
   if (remap_supermesh(ctx, &all, &v) != REMAP_OK) fprintf(stderr, "%s\n", remap_message(ctx)), exit(1);
   const double t1 = bench_cpu();
   printf("{\"bench\":\"supermesh\",\"rank\":%d,\"ranks\":%d,\"maph\":%lld,\"maph_here\":%lld,\"faces\":%lld,\"nodes\":%lld,"
-         "\"us_per_maph\":%.2f,\"bytes_peak_per_maph\":%.0f,\"bytes_held_per_maph\":%.0f,\"s_partition\":%.3f,\"s_triangulation\":%.3f,\"s_crossings\":%.3f,"
+         "\"us_per_maph\":%.2f,\"bytes_peak_per_maph\":%.0f,\"bytes_held_per_maph\":%.0f,"
+         "\"s_partition\":%.3f,\"s_triangulation\":%.3f,\"s_crossings\":%.3f,"
          "\"s_polygons\":%.3f,\"s_cells\":%.3f,\"s_faces\":%.3f,\"s_numbering\":%.3f,\"s_user\":%.3f,\"hash\":\"%016llx\"}\n",
          rank, size, (long long)v.global_cells, (long long)v.num_cells, (long long)v.num_faces, (long long)v.num_nodes,
          1e6 * (t1 - t0) / (double)v.num_cells, (bench_heap_peak() - held) / (double)v.num_cells,

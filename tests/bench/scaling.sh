@@ -47,11 +47,12 @@ fields | awk -v largest="$largest" '$14 == largest { n = $3 / $2
 echo
 echo "Fits by relative least squares, all N, 2 to 32 ranks P, n cells of both meshes per rank:"
 echo
-echo "| cells dealt in | y | model | a | b | c | error: mean | worst |"
-echo "|---|---|---|---|---|---|---|---|"
+echo "| cells dealt in | y | model | a | b | c | d | error: mean | worst |"
+echo "|---|---|---|---|---|---|---|---|---|"
 # The terms of a model, u[1] .. u[terms], for n cells per rank on P ranks, N^2 cells in a plane.
 #   sent   n times the share of cells that leave their rank, and the surface within the mesh of n cells on P ranks
 #   held   n, the same surface, 1
+#   peak   these, and the cells of a block of 25,000 triangles, or fewer
 #   asked  random dealing: n times the ranks that 18 partners dealt at random lie on, without its own; slabs: the planes beside
 fit() { fields | awk -v dealt="$1" -v column="$2" -v model="$3" -v name="$4" -v formula="$5" '
   function share(P, k) {
@@ -62,7 +63,8 @@ fit() { fields | awk -v dealt="$1" -v column="$2" -v model="$3" -v name="$4" -v 
   $1 == dealt && $2 > 1 {
     m++; P = $2; n = $3 / P; y[m] = $column; surface = n ^ (2 / 3) * (1 - P ^ (-1 / 3))
     if (model == "sent") { terms = 2; u[m, 1] = n * share(P); u[m, 2] = surface }
-    if (model == "held") { terms = 3; u[m, 1] = n; u[m, 2] = surface; u[m, 3] = 1 }
+    if (model == "held" || model == "peak") { terms = 3; u[m, 1] = n; u[m, 2] = surface; u[m, 3] = 1 }
+    if (model == "peak") { terms = 4; u[m, 4] = n < 25000 / 12 ? n : 25000 / 12 }
     if (model == "asked") {
       terms = 1
       u[m, 1] = dealt == "random" ? n * (P - 1) * (1 - (1 - 1 / P) ^ 18) : (P > 2 ? 2 : 1) * $14 ^ 2
@@ -88,12 +90,12 @@ fit() { fields | awk -v dealt="$1" -v column="$2" -v model="$3" -v name="$4" -v 
       if (e > worst) worst = e
     }
     printf "| %s | %s | %s |", dealt, name, formula
-    for (i = 1; i <= 3; i++) if (i <= terms) printf " %.0f |", s[i, terms + 1] / s[i, i]; else printf " |"
+    for (i = 1; i <= 4; i++) if (i <= terms) printf " %.0f |", s[i, terms + 1] / s[i, i]; else printf " |"
     printf " %.0f %% | %.0f %% |\n", 100 * mean, 100 * worst
   }'; }
 for dealt in slabs random; do
   fit $dealt 5 sent "bytes sent by remap_build" "a n L + b S"
-  fit $dealt 9 held "peak bytes of remap_build" "a n + b S + c"
+  fit $dealt 9 peak "peak bytes of remap_build" "a n + b S + c + d B"
   fit $dealt 10 held "bytes kept" "a n + b S + c"
 done
 fit slabs 12 asked "bytes sent by remap_field" "a N^2, twice from 3 ranks on"

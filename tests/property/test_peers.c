@@ -295,6 +295,7 @@ RT_MAIN(RT_CASE(layers_of_pancakes_on_a_curved_wall_fill_each_other),
         RT_CASE(neighbours_a_thousand_million_times_larger_do_not_matter), RT_CASE(the_unit_of_length_does_not_matter),
         RT_CASE(a_place_far_from_the_origin_does_not_matter), RT_CASE(a_mesh_inside_one_cell_of_the_other_is_wholly_mapped),
         RT_CASE(a_gap_thinner_than_a_cell_stays_a_gap),
-        RT_CASE(zones_that_touch_in_a_plane_are_whole_whatever_their_faces), RT_CASE(cells_a_million_times_smaller_are_not_dropped),
+        RT_CASE(zones_that_touch_in_a_plane_are_whole_whatever_their_faces),
+        RT_CASE(cells_a_million_times_smaller_are_not_dropped),
         RT_CASE(rotated_boxes_share_the_volume_known), RT_CASE(warped_faces_lose_nothing_on_either_side),
         RT_CASE(disjoint_and_touching_meshes_share_nothing), RT_CASE(an_overlap_a_millionth_of_a_millionth_thick_survives))

@@ -30,10 +30,12 @@ typedef struct rm_place {
   int               num_moves;      /* since routes were chosen                                          */
 } rm_place;
 
-/* What a rank overlays at once at most: about 3300 hexahedra of either mesh, for which the overlay takes 12 MB with diagonal
- * faces, 21 MB with centres; and how many triangles may come twice for that. Less on small
- * ranks, for what they take to fall with their number. Pairs that go home at once, at least: of 200 bytes
- * while they do. */
+/* RM_BLOCK_TRIANGLES  what a rank overlays at once at most: about 3300 hexahedra of either mesh, which takes 12 MB with
+ *                     diagonal faces, 21 MB with centres
+ * RM_BLOCKS           that many on small ranks, whose peak is to fall with their cells, but
+ * RM_BLOCK_FEW        not of fewer triangles than that
+ * RM_BLOCK_REPEATS    triangles of sources that may come once more for that, over those of all cells of the rank
+ * RM_SLICE_PAIRS      pairs that go home at once, at least; 200 bytes each while they do */
 enum { RM_BLOCK_TRIANGLES = 80000, RM_BLOCKS = 28, RM_BLOCK_FEW = 25000, RM_SLICE_PAIRS = 20000 };
 #define RM_BLOCK_REPEATS 0.5
 

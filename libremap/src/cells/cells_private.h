@@ -56,6 +56,10 @@ typedef struct rm_limit_home {
   rm_cells_passing *passing;
 } rm_limit_home;
 
+/* BAD_MESH with the cell at triangle t of mesh `side` as the one where spots or pieces contradict each other, which overlapping
+ * cells make. */
+remap_status rm_cells_tangled(const rm_part *part, const rm_trimesh *mesh, int side, rm_lid t, rm_reason *reason);
+
 /* Its meshes are those of the overlay, which it uses up. BAD_MESH with cell and reason where cells overlap. O(n) expected. */
 remap_status rm_limit_build(const rm_limit_home *home, const rm_part *part, const rm_overlay *o, const rm_limit **out,
                             rm_reason *reason);

@@ -47,6 +47,15 @@ static remap_status overlapping(const builder *b, int side, rm_lid cell)
                  "this cell overlaps another of its mesh; a supermesh needs cells that do not");
 }
 
+remap_status rm_cells_tangled(const rm_part *part, const rm_trimesh *mesh, int side, rm_lid t, rm_reason *reason)
+{
+  const rm_lid *cell = mesh->side[t], c = cell[0] >= 0 ? cell[0] : cell[1];
+
+  return rm_fail(REMAP_BAD_MESH, reason, side, c >= 0 ? part->piece[side].cell_global[c] : -1,
+                 "a face of this cell meets cells of the other mesh that overlap, or overlaps faces of its own mesh; a "
+                 "supermesh needs cells that do not");
+}
+
 /* The sides of triangles first..last - 1, which lie on each other, less the cells that are on both. */
 static remap_status net_sides(const builder *b, int side, rm_lid first, rm_lid last, rm_lid net[2])
 {
@@ -522,6 +531,15 @@ static remap_status line_room(line *l)
   return rm_grow(&l->state, &l->room[1], l->num + 1, sizeof *l->state);
 }
 
+/* Is spot k of a line, which is not an end of edge e, inside the edge? Where cells of the other mesh overlap it may be an end
+ * once more. */
+static bool spot_is_inside(const builder *b, int side, rm_lid e, const line *l, int64_t k)
+{
+  const rm_feature f = b->l->spot[l->spot[k]].at[side];
+
+  return f.kind == RM_ON_EDGE && f.id == e;
+}
+
 /* Put a spot inside edge e, which has no crossing, to its place. */
 static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, rm_lid p)
 {
@@ -535,6 +553,7 @@ static remap_status insert_spot(const builder *b, int side, rm_lid e, line *l, r
   rm_spot_plane(b->l, &b->l->spot[p], side, mine);
   while (low < high) {
     const int64_t middle = (low + high) / 2;
+    if (!spot_is_inside(b, side, e, l, middle)) return rm_cells_tangled(b->part, m, side, m->ring[m->ring_offset[e]] / 4, b->reason);
     rm_spot_plane(b->l, &b->l->spot[l->spot[middle]], side, its);
     if (rm_crossing_order(p0, p1, (const double (*)[3])mine, (const double (*)[3])its, 1) < 0) high = middle;
     else low = middle + 1;

@@ -46,12 +46,7 @@ static inline int other_side(const work *w) { return 1 - w->side; }
 
 static remap_status tangled(const work *w)
 {
-  const rm_lid *cell = w->l->mesh[w->side]->side[w->t];
-  const rm_lid  c    = cell[0] >= 0 ? cell[0] : cell[1];
-  return rm_fail(
-      REMAP_BAD_MESH, w->reason, w->side, c >= 0 ? w->part->piece[w->side].cell_global[c] : -1,
-      "a face of this cell meets cells of the other mesh that overlap, or overlaps faces of its own mesh; a supermesh "
-      "needs cells that do not");
+  return rm_cells_tangled(w->part, w->l->mesh[w->side], w->side, w->t, w->reason);
 }
 
 /* ---- segments of mesh 2 ------------------------------------------------------------------------------------------ */

@@ -110,7 +110,7 @@ static double parameter_tail(double line[2][3], double plane[3][3], double lambd
 }
 
 /* The spot in two parts, low what rounding took from xyz; *error is a bound of the error of each coordinate. Where two edges
- * meet in a point of doubles, as those of boxes do, it is that point: zones that touch in a plane do so when they are joined. */
+ * meet in a point of doubles, as those of boxes do, it is that point: zones that touch in a plane do so when joined. */
 static void place(const rm_limit *l, const rm_spot *spot, double xyz[3], float low[3], float *error)
 {
   double line[2][3], plane[3][3], tail = 0, size = 0, reach = 0;
