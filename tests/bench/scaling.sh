@@ -5,8 +5,8 @@
 #
 #   tests/bench/scaling.sh BUILD [N ...]
 #
-# BUILD is the build folder. N defaults to 12 16 20 24 32; the largest makes the table, all make the fits. Takes some ten
-# minutes.
+# BUILD is the build folder. N defaults to 12 16 20 24 32; the largest makes the table, all of them and half as much again make
+# the fits. Takes some ten minutes.
 set -eu
 build=${1:?usage: scaling.sh BUILD [N ...]}
 shift
@@ -23,14 +23,20 @@ run() {
   mpirun --oversubscribe --mca mpi_yield_when_idle 1 -n "$ranks" "$build/tests/$program" "$@"
 }
 
-for n; do
-  for ranks in 1 2 4 8 16 32; do
+# both N RANKS ...
+both() {
+  n=$1
+  shift
+  for ranks; do
     for dealt in "" RANDOM; do
       printf '%s ' "$n"
       run "$ranks" bench_scaling even "$n" $dealt
     done
   done
-done >"$work"
+}
+
+for size; do both "$size" 1 2 4 8 16 32; done >"$work"
+both $((largest * 3 / 2)) 2 4 8 >>"$work" # ranks with many cells, for the fits
 
 # dealt ranks cells, build: messages bytes partners collectives collective_bytes peak kept, field: messages bytes partners; N
 fields() { tr -d '{}"' <"$work" | tr ':,' '  ' |
