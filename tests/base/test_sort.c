@@ -233,9 +233,18 @@ static void points_of_a_grid_do_not_collide(void)
   free(hash);
 }
 
+static void an_item_lies_behind_the_last_offset_not_beyond_it(void)
+{
+  const int64_t offset[] = {2, 5, 5, 9}, of[] = {0, 0, 0, 0, 0, 2, 2, 2, 2, 3, 3};
+
+  for (int64_t item = 0; item <= 10; item++) RT_EQ(rm_interval_of(4, offset, item), of[item]);
+  RT_EQ(rm_interval_of(0, NULL, 3), -1);
+}
+
 RT_MAIN(RT_CASE(keys_are_sorted_and_equal_keys_keep_their_order), RT_CASE(words_are_sorted), RT_CASE(doubles_are_sorted),
         RT_CASE(minus_zero_comes_before_plus_zero), RT_CASE(quicksort_killer_is_sorted_in_time),
         RT_CASE(sum_of_a_list_does_not_depend_on_its_order), RT_CASE(sum_of_a_list_is_compensated),
-        RT_CASE(counts_become_offsets), RT_CASE(items_are_grouped_by_key_in_their_order_and_left_out_below_0),
+        RT_CASE(counts_become_offsets), RT_CASE(an_item_lies_behind_the_last_offset_not_beyond_it),
+        RT_CASE(items_are_grouped_by_key_in_their_order_and_left_out_below_0),
         RT_CASE(zeros_of_both_signs_hash_alike),
         RT_CASE(every_bit_of_a_word_reaches_every_bit_of_its_hash), RT_CASE(points_of_a_grid_do_not_collide))

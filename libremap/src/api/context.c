@@ -146,19 +146,6 @@ void remap_destroy(remap_context **ctx)
   *ctx = NULL;
 }
 
-int64_t rm_context_zone_of(const rm_labels *labels, rm_gid cell)
-{
-  int64_t low = 0, high = labels->num_zones;
-
-  while (high - low > 1) {
-    const int64_t middle = low + (high - low) / 2;
-
-    if (labels->zone_cell_offset[middle] <= cell) low = middle;
-    else high = middle;
-  }
-  return high > low ? low : -1;
-}
-
 void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason *reason)
 {
   const char *text = reason->text[0] ? reason->text : remap_status_text(status);
@@ -169,7 +156,8 @@ void rm_context_explain(remap_context *ctx, remap_status status, const rm_reason
   }
   const rm_labels *labels = &ctx->labels[reason->side];
   const char      *mesh   = labels->mesh ? labels->mesh : reason->side == REMAP_SOURCE ? "source mesh" : "target mesh";
-  const int64_t    zone   = reason->global_cell < 0 ? -1 : rm_context_zone_of(labels, reason->global_cell);
+  const int64_t    zones  = reason->global_cell < 0 ? 0 : labels->num_zones;
+  const int64_t    zone   = rm_interval_of(zones, labels->zone_cell_offset, reason->global_cell);
 
   if (reason->global_cell < 0)
     snprintf(ctx->message, sizeof ctx->message, "%s: %s", mesh, text);

@@ -120,9 +120,6 @@ remap_status rm_context_meet_few(remap_context *ctx);
 /* The same once carriers are made. Collective. NO_MEMORY: everything stays as it is. */
 remap_status rm_context_meet(remap_context *ctx);
 
-/* The zone of a global cell, -1 if there are none. Not collective. */
-int64_t rm_context_zone_of(const rm_labels *labels, rm_gid cell);
-
 /* Find the largest overlap of zones of each mesh, for stats. Collective. ZONE_OVERLAP if that is an error. */
 remap_status rm_context_compare_zones(remap_context *ctx, rm_reason *reason);
 

@@ -13,7 +13,8 @@ static remap_status list_zones(const remap_context *ctx, int side, rm_arena *are
 
   if (!arena) return REMAP_NO_MEMORY;
   RM_NEW(*out, arena, mesh->num_cells);
-  for (rm_lid c = 0; c < mesh->num_cells; c++) (*out)[c] = (rm_lid)rm_context_zone_of(labels, mesh->cell_global[c]);
+  for (rm_lid c = 0; c < mesh->num_cells; c++)
+    (*out)[c] = (rm_lid)rm_interval_of(labels->num_zones, labels->zone_cell_offset, mesh->cell_global[c]);
   return REMAP_OK;
 }
 
@@ -81,7 +82,7 @@ remap_status rm_context_compare_zones(remap_context *ctx, rm_reason *reason)
   for (int side = 0; ctx->options.zone_overlap_is_error && side < 2; side++) {
     const rm_labels *labels = &ctx->labels[side];
     const rm_gid     other  = ctx->stats.zone_overlap_cell[side][1];
-    const int64_t    zone   = rm_context_zone_of(labels, other);
+    const int64_t    zone   = rm_interval_of(labels->num_zones, labels->zone_cell_offset, other);
 
     if (other < 0) continue;
     return rm_fail(REMAP_ZONE_OVERLAP, reason, side, ctx->stats.zone_overlap_cell[side][0],

@@ -110,6 +110,9 @@ void rm_sort_words(uint64_t *data, int64_t n);
 double rm_sum_sorted(double *data, int64_t n);
 /* In place exclusive prefix sum over count[0..n]: count[0..n-1] hold counts, afterwards offsets, count[n] the total. */
 int64_t rm_offsets(int64_t *count, int64_t n);
+/* The last k below n with offset[k] <= item, offset ascending: where the item lies, say the zone of a cell. 0 if all are
+ * greater, -1 if n is 0. O(log n). */
+int64_t rm_interval_of(int64_t n, const int64_t *offset, int64_t item);
 /* Group the items 0 to n - 1, n < 2^31, by key[k] < num_keys, in their order: those of key i to order, [n], from offset[i] on;
  * those whose key is below 0 are left out. offset is [num_keys + 1]. By counting, without allocation, O(n + num_keys). Returns
  * how many there are. */

@@ -213,6 +213,19 @@ int64_t rm_offsets(int64_t *count, int64_t n)
   return at;
 }
 
+int64_t rm_interval_of(int64_t n, const int64_t *offset, int64_t item)
+{
+  int64_t low = 0, high = n;
+
+  while (high - low > 1) {
+    const int64_t middle = low + (high - low) / 2;
+
+    if (offset[middle] <= item) low = middle;
+    else high = middle;
+  }
+  return high > low ? low : -1;
+}
+
 int64_t rm_group(int64_t n, const rm_lid *key, int64_t num_keys, int64_t *offset, rm_lid *order)
 {
   RM_ASSERT(n <= INT32_MAX);

@@ -145,18 +145,9 @@ enum { IS_SKIN = -2, IS_JOINED = -1 };
 /* Zone of a global cell, -1 if it lies in none. */
 static int64_t zone_of(const remap_mesh *given, rm_gid cell)
 {
-  int64_t lo = 0, hi = given->num_zones; /* the answer, if there is one, lies in [lo, hi) */
+  const int64_t *offset = given->zone_cell_offset, num = given->num_zones;
 
-  if (hi == 0 || cell < given->zone_cell_offset[0] || cell >= given->zone_cell_offset[hi]) return -1;
-  while (hi - lo > 1) {
-    const int64_t mid = lo + (hi - lo) / 2;
-
-    if (cell < given->zone_cell_offset[mid])
-      hi = mid;
-    else
-      lo = mid;
-  }
-  return lo;
+  return num > 0 && cell >= offset[0] && cell < offset[num] ? rm_interval_of(num, offset, cell) : -1;
 }
 
 /* Records of this rank's shared loops, by destination. */

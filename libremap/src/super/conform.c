@@ -19,18 +19,6 @@ typedef struct work {
   rm_reason          *reason;
 } work;
 
-int64_t rm_zone_of(const rm_zones *zones, rm_gid cell)
-{
-  int64_t low = 0, high = zones->num;
-
-  while (high - low > 1) {
-    const int64_t middle = low + (high - low) / 2;
-    if (zones->cell_offset[middle] <= cell) low = middle;
-    else high = middle;
-  }
-  return low;
-}
-
 /* ---- zones of one colour ----------------------------------------------------------------------------------------- */
 
 /* Arrays of a mesh as room mesh reads them, and where its cells and faces come from. */

@@ -144,7 +144,10 @@ typedef struct rm_conformed {
 } rm_conformed;
 
 /* The zone of a cell. */
-int64_t rm_zone_of(const rm_zones *zones, rm_gid cell);
+static inline int64_t rm_zone_of(const rm_zones *zones, rm_gid cell)
+{
+  return rm_interval_of(zones->num, zones->cell_offset, cell);
+}
 
 /* Colours of the zones of one mesh, [zones], from 0; different where zones touch and faces do not match. Collective. */
 remap_status rm_super_colour_zones(const rm_super_job *job, int side, int64_t *colour, int *num_colours, rm_reason *reason);
